@@ -1,0 +1,12 @@
+"""Chooses which learning agents should play together in adversarial team games.
+
+training.py      the loop of the paper's Algorithm 1
+selector/        who plays together: uniform, mcaa, berteam
+optimizer/       who stays in the population: coevolution, mapelites, fixed
+learner/         how a member learns from its own steps: ppo, dqn, fixed
+env/             the games: mctf, rps
+rating/          Elo
+evaluation/      tournaments and the true strength of teams
+"""
+
+__version__ = "0.1.0"

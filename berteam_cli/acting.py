@@ -1,0 +1,165 @@
+"""How members act: one table of policies that compiled games read.
+
+A network is evaluated one observation at a time in a fixed order of additions, so an action never depends on
+which other games or members happen to be computed beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+FIXED, SAMPLED, GREEDY = 0, 1, 2  # kinds of policy
+DEEPEST = 6  # hidden layers a network may have
+
+
+class Policies(NamedTuple):
+    """The policies of K members, as arrays.
+
+    Attributes:
+        kind: (K,) int8, FIXED, SAMPLED (softmax over the outputs) or GREEDY (highest output).
+        fixed: (K,) int16, index of the game's fixed policy; meaningless for networks.
+        sizes: (K, DEEPEST + 2) int32, width of each layer from observation to actions, 0 after the last.
+        tanh: (K,) bool, whether hidden layers use tanh, else ReLU.
+        epsilon: (K,) float32, chance of a uniformly random action; used by GREEDY only.
+        weights: (K, W) float32, for each layer its matrix (in, out) row by row, then its bias; zeros behind.
+    """
+
+    kind: npt.NDArray[np.int8]
+    fixed: npt.NDArray[np.int16]
+    sizes: npt.NDArray[np.int32]
+    tanh: npt.NDArray[np.bool_]
+    epsilon: npt.NDArray[np.float32]
+    weights: npt.NDArray[np.float32]
+
+    @property
+    def widest(self) -> int:
+        """Largest number of values in any layer."""
+        return max(1, int(self.sizes.max(initial=1)))
+
+
+def fixed_policies(indices: npt.ArrayLike) -> Policies:
+    """Returns one row for each of the game's fixed policies in ``indices``."""
+    fixed = np.asarray(indices, dtype=np.int16)
+    return Policies(
+        kind=np.full(len(fixed), FIXED, dtype=np.int8),
+        fixed=fixed,
+        sizes=np.zeros((len(fixed), DEEPEST + 2), dtype=np.int32),
+        tanh=np.zeros(len(fixed), dtype=np.bool_),
+        epsilon=np.zeros(len(fixed), dtype=np.float32),
+        weights=np.zeros((len(fixed), 0), dtype=np.float32),
+    )
+
+
+def networks(
+    kind: int,
+    layers: list[tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]],
+    *,
+    tanh: bool,
+    epsilon: npt.ArrayLike = 0.0,
+) -> Policies:
+    """Returns K policies of one architecture.
+
+    Args:
+        kind: SAMPLED or GREEDY.
+        layers: for each layer its matrices (K, in, out) and biases (K, out), from observation to actions.
+        tanh: whether hidden layers use tanh, else ReLU.
+        epsilon: (K,) or one number in [0, 1].
+    """
+    members = len(layers[0][0])
+    widths = [layers[0][0].shape[1]] + [bias.shape[1] for _, bias in layers]
+    sizes = np.zeros((members, DEEPEST + 2), dtype=np.int32)
+    sizes[:, : len(widths)] = widths
+    flat = [part.reshape(members, -1) for layer in layers for part in layer]
+    return Policies(
+        kind=np.full(members, kind, dtype=np.int8),
+        fixed=np.zeros(members, dtype=np.int16),
+        sizes=sizes,
+        tanh=np.full(members, tanh, dtype=np.bool_),
+        epsilon=np.broadcast_to(np.asarray(epsilon, dtype=np.float32), (members,)).copy(),
+        weights=np.ascontiguousarray(np.concatenate(flat, axis=1), dtype=np.float32),
+    )
+
+
+def joined(tables: list[Policies]) -> Policies:
+    """Returns the rows of all ``tables``, one table after the other."""
+    widest = max(table.weights.shape[1] for table in tables)
+    weights = [np.pad(t.weights, ((0, 0), (0, widest - t.weights.shape[1]))) for t in tables]
+    columns = [np.concatenate(column) for column in zip(*(t[:-1] for t in tables), strict=True)]
+    return Policies(*columns, weights=np.concatenate(weights))
+
+
+@njit(cache=True, nogil=True)
+def act(policies: Policies, k: int, observation: np.ndarray, work: np.ndarray, chance: float, choice: float) -> int:
+    """Returns the action of policy ``k``, a network, on one observation.
+
+    Args:
+        policies: the table.
+        k: row of a SAMPLED or GREEDY policy.
+        observation: (O,) float32.
+        work: (2, policies.widest) float32 scratch; changed.
+        chance: in [0, 1), decides whether a GREEDY policy explores.
+        choice: in [0, 1), decides which action is drawn.
+    """
+    sizes, weights = policies.sizes[k], policies.weights[k]
+    x, y = work[0], work[1]
+    wide = sizes[0]
+    for i in range(wide):
+        x[i] = observation[i]
+    at, layer = 0, 1
+    while layer < len(sizes) and sizes[layer] > 0:
+        out = sizes[layer]
+        bias = at + wide * out
+        for j in range(out):
+            y[j] = weights[bias + j]
+        for i in range(wide):  # one input at a time: the inner loop runs over neighbours in memory
+            x_i = x[i]
+            for j in range(out):
+                y[j] += x_i * weights[at + j]
+            at += out
+        at = bias + out
+        last = layer + 1 == len(sizes) or sizes[layer + 1] == 0
+        if not last:
+            if policies.tanh[k]:
+                for j in range(out):
+                    y[j] = math.tanh(y[j])
+            else:
+                for j in range(out):
+                    y[j] = max(y[j], np.float32(0.0))
+        x, y = y, x
+        wide = out
+        layer += 1
+    if policies.kind[k] == GREEDY:
+        if chance < policies.epsilon[k]:
+            return min(int(choice * wide), wide - 1)
+        return highest(x, wide)
+    return drawn(x, wide, choice)
+
+
+@njit(cache=True, nogil=True)
+def highest(values: np.ndarray, count: int) -> int:
+    """Returns the first index of the largest of ``values[:count]``."""
+    best = 0
+    for j in range(1, count):
+        if values[j] > values[best]:
+            best = j
+    return best
+
+
+@njit(cache=True, nogil=True)
+def drawn(logits: np.ndarray, count: int, choice: float) -> int:
+    """Returns an index drawn from softmax(``logits[:count]``) by the number ``choice`` in [0, 1)."""
+    top = logits[highest(logits, count)]
+    total = 0.0
+    for j in range(count):
+        total += math.exp(logits[j] - top)
+    left = choice * total
+    for j in range(count):
+        left -= math.exp(logits[j] - top)
+        if left < 0.0:
+            return j
+    return highest(logits, count)  # rounding left a crumb behind the last action

@@ -1,0 +1,122 @@
+"""Saves a run so that it can go on: tensors as safetensors, the rest as JSON, nothing that runs code when read."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load_file, save_file
+
+from berteam_cli.errors import RunError
+from berteam_cli.population import ARRAYS, Population
+from berteam_cli.training import Parts, Run
+
+SCHEMA = 1  # raised when a file of an older version could be misread
+KEPT = 2
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What a checkpoint holds.
+
+    Attributes:
+        run: the state of the run.
+        table_sizes: bytes of each growing table at that moment.
+        seconds: the run had taken.
+    """
+
+    run: Run
+    table_sizes: dict[str, int]
+    seconds: float
+
+
+def save(folder: Path, saved: Saved, parts: Parts) -> None:
+    """Saves a run under ``folder``/checkpoint; the last two are kept.
+
+    The files are written under another name first: whoever interrupts this leaves the older checkpoints as they were.
+    """
+    run = saved.run
+    place = folder / "checkpoint"
+    final, part = place / f"epoch_{run.epoch:08d}", place / "part"
+    shutil.rmtree(part, ignore_errors=True)
+    part.mkdir(parents=True)
+    save_file(tensors_of(run, parts), part / "tensors.safetensors")
+    said = {
+        "schema": SCHEMA,
+        "epoch": run.epoch,
+        "played": run.played,
+        "steps": run.steps,
+        "seconds": saved.seconds,
+        "table_sizes": saved.table_sizes,
+        "sha256": digest(part / "tensors.safetensors"),
+    }
+    (part / "state.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+    for file in part.iterdir():
+        with file.open("rb") as opened:
+            os.fsync(opened.fileno())
+    shutil.rmtree(final, ignore_errors=True)
+    os.replace(part, final)
+    for old in sorted(place.glob("epoch_*"))[:-KEPT]:
+        shutil.rmtree(old)
+
+
+def load(folder: Path, parts: Parts) -> Saved:
+    """Returns the newest checkpoint under ``folder`` that is whole.
+
+    Raises:
+        RunError: there is none.
+    """
+    damage = "there is none"
+    for place in sorted((folder / "checkpoint").glob("epoch_*"), reverse=True):
+        try:
+            return read(place, parts)
+        except (OSError, ValueError, KeyError, SafetensorError) as error:
+            damage = f"{place.name} is damaged: {error}"
+    raise RunError(f"{folder} has no checkpoint to go on from ({damage}).")
+
+
+def read(place: Path, parts: Parts) -> Saved:
+    """Returns the checkpoint in folder ``place``.
+
+    Raises:
+        ValueError: it is of another version or was changed since it was written.
+    """
+    said = json.loads((place / "state.json").read_text(encoding="utf-8"))
+    if said["schema"] != SCHEMA:
+        raise ValueError(f"its schema is {said['schema']}, this version reads {SCHEMA}")
+    if digest(place / "tensors.safetensors") != said["sha256"]:
+        raise ValueError("its checksum is wrong")
+    tensors = load_file(place / "tensors.safetensors")
+    minds = tuple(
+        island.learner.restored(below(tensors, f"island.{i}.")) for i, island in enumerate(parts.optimizer.islands)
+    )
+    arrays = {name: tensors[f"population.{name}"].numpy() for name in ARRAYS}
+    selection = parts.selector.restored(below(tensors, "selector."))
+    run = Run(said["epoch"], Population(minds=minds, **arrays), selection, said["played"], said["steps"])
+    return Saved(run, said["table_sizes"], said["seconds"])
+
+
+def tensors_of(run: Run, parts: Parts) -> dict[str, torch.Tensor]:
+    """Returns all tensors of a run by name, on the processor and each with memory of its own."""
+    tensors = {f"population.{name}": torch.from_numpy(getattr(run.population, name)) for name in ARRAYS}
+    for i, (island, mind) in enumerate(zip(parts.optimizer.islands, run.population.minds, strict=True)):
+        tensors |= {f"island.{i}.{name}": tensor for name, tensor in island.learner.tensors(mind).items()}
+    tensors |= {f"selector.{name}": tensor for name, tensor in parts.selector.tensors(run.selection).items()}
+    return {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+
+
+def below(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
+    """Returns the tensors whose names begin with ``prefix``, without it."""
+    return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
+
+
+def digest(path: Path) -> str:
+    """Returns the SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

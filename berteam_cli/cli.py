@@ -1,0 +1,203 @@
+"""The command: a word, and what follows it. Besides config.py and compose.py only this module knows Hydra.
+
+Exit codes: 0 done, 2 the input is wrong, 3 the run failed, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from berteam_cli import __version__
+from berteam_cli.errors import InputError, RunError, did_you_mean
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+WRONG, FAILED, INTERRUPTED = 2, 3, 130
+
+WORDS = {
+    "train": "one run: selector x optimizer x env; -m sweeps",
+    "resume": "goes on with a run from its last checkpoint",
+    "tournament": "every team against every other",
+    "inspect": "the tables of a run in the terminal",
+    "list": "what can be chosen",
+}
+
+HELP = f"""berteam {__version__}: chooses which learning agents should play together.
+
+  berteam train selector=mcaa optimizer=mapelites
+  berteam train -m selector=berteam,mcaa optimizer=coevolution,mapelites seed=0,1,2
+  berteam inspect outputs/train/...
+
+Commands (each has --help):
+{chr(10).join(f"  {word:<11} {does}" for word, does in WORDS.items())}
+"""
+
+
+def main() -> None:
+    """Runs the command line and exits with its code."""
+    words = sys.argv[1:]
+    if not words or words[0] in {"-h", "--help"}:
+        print(HELP)
+        sys.exit(0)
+    if words[0] == "--version":
+        print(__version__)
+        sys.exit(0)
+    try:
+        run(words[0], words[1:])
+    except InputError as error:
+        print(f"berteam: {error}", file=sys.stderr)
+        sys.exit(WRONG)
+    except RunError as error:
+        print(f"berteam: {error}", file=sys.stderr)
+        sys.exit(FAILED)
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+
+
+def run(word: str, words: list[str]) -> None:
+    """Runs one sub-command.
+
+    Raises:
+        InputError: there is no such command, or its arguments are wrong.
+    """
+    if word not in WORDS:
+        raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
+    {"train": composed, "tournament": composed, "resume": resume, "inspect": inspect, "list": listing}[word](
+        word, words
+    )
+
+
+def composed(word: str, words: list[str]) -> None:
+    """Runs a command whose config Hydra composes."""
+    import hydra  # noqa: PLC0415 (start-up: each command imports what it needs)
+
+    from berteam_cli.compose import arguments, check, prepare  # noqa: PLC0415
+
+    prepare()
+    given = arguments(words)
+    if not (given.help or given.hydra_help or given.shell_completion):
+        check(word, words)
+    sys.argv = [f"berteam {word}", *words]
+    task = {"train": train_task, "tournament": tournament_task}[word]
+    try:
+        hydra.main(version_base="1.3", config_path="pkg://berteam_cli.conf", config_name=word)(task)()
+    finally:
+        logging.getLogger("berteam").handlers = []
+    if given.multirun and Sweeps.failed:
+        raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
+
+
+class Sweeps:
+    """What became of the runs of a sweep in this process."""
+
+    failed = 0
+    table: Path | None = None
+
+
+def train_task(cfg: DictConfig) -> float:
+    """Trains; what Hydra calls for each run. Returns the expected Elo, for sweepers that look for the best."""
+    from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
+    from hydra.types import RunMode  # noqa: PLC0415
+    from omegaconf import OmegaConf  # noqa: PLC0415
+
+    from berteam_cli.command.sweep import swept  # noqa: PLC0415
+    from berteam_cli.command.train import train  # noqa: PLC0415
+    from berteam_cli.config import checked  # noqa: PLC0415
+
+    text = OmegaConf.to_yaml(cfg, resolve=True)
+    hydra_config = HydraConfig.get()
+    if hydra_config.mode != RunMode.MULTIRUN:
+        config = checked(cfg)
+        return outside(lambda: train(config, text, Path(config.out) if config.out else None))
+    folder = Path(hydra_config.runtime.output_dir)
+    overrides = [x for x in hydra_config.overrides.task]
+    Sweeps.table = folder.parent / "sweep.csv"
+    expected, ok = swept(lambda: train(checked(cfg), text, folder), folder, overrides)
+    Sweeps.failed += not ok
+    return expected
+
+
+def tournament_task(cfg: DictConfig) -> None:
+    """Plays a tournament; what Hydra calls."""
+    from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
+    from hydra.types import RunMode  # noqa: PLC0415
+    from omegaconf import OmegaConf  # noqa: PLC0415
+
+    from berteam_cli.command.tournament import play  # noqa: PLC0415
+    from berteam_cli.config import checked  # noqa: PLC0415
+
+    config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
+    folder = Path(config.out) if config.out else None
+    if HydraConfig.get().mode == RunMode.MULTIRUN:
+        folder = Path(HydraConfig.get().runtime.output_dir)
+    outside(lambda: play(config, text, folder))
+
+
+def outside(task: Any) -> Any:
+    """Returns what ``task`` returns, and takes its errors past Hydra, which would print a traceback of them."""
+    try:
+        return task()
+    except InputError as error:
+        print(f"berteam: {error}", file=sys.stderr)
+        raise SystemExit(WRONG) from None
+    except RunError as error:
+        print(f"berteam: {error}", file=sys.stderr)
+        raise SystemExit(FAILED) from None
+
+
+def reader(word: str, words: list[str], **arguments: dict[str, Any]) -> argparse.Namespace:
+    """Returns the arguments of a command that Hydra does not compose.
+
+    Raises:
+        InputError: they are not of the command's form.
+    """
+    parser = argparse.ArgumentParser(prog=f"berteam {word}", description=WORDS[word])
+
+    def refuse(message: str) -> None:
+        raise InputError(f"berteam {word}: {message}; see berteam {word} --help.")
+
+    parser.error = refuse  # type: ignore[assignment,method-assign]
+    for name, settings in arguments.items():
+        parser.add_argument(name.replace("__", "--"), **settings)
+    return parser.parse_args(words)
+
+
+def resume(word: str, words: list[str]) -> None:
+    """Goes on with a run."""
+    given = reader(
+        word,
+        words,
+        run={"type": Path, "help": "folder of the run"},
+        overrides={"nargs": "*", "help": "epochs=N, workers=N, ..."},
+    )
+    from berteam_cli.command.resume import resume as go_on  # noqa: PLC0415
+
+    go_on(given.run, given.overrides)
+
+
+def inspect(word: str, words: list[str]) -> None:
+    """Shows the tables of a run."""
+    given = reader(
+        word,
+        words,
+        run={"type": Path, "help": "folder of the run"},
+        __top={"type": int, "default": 10, "help": "rows of each table"},
+    )
+    if given.top < 1:
+        raise InputError(f"--top must be >= 1, but is {given.top}.")
+    from berteam_cli.command.inspect import show  # noqa: PLC0415
+
+    show(given.run, given.top)
+
+
+def listing(word: str, words: list[str]) -> None:
+    """Lists the choices."""
+    given = reader(word, words, group={"nargs": "?", "help": "only of this group"})
+    from berteam_cli.command.listing import show  # noqa: PLC0415
+
+    show(given.group)

@@ -1,0 +1,119 @@
+"""berteam tournament: every team against every other, of the fixed policies or of a trained run."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from berteam_cli import build, checkpoint
+from berteam_cli.acting import Policies, fixed_policies
+from berteam_cli.command.inspect import show
+from berteam_cli.command.resume import stored_config
+from berteam_cli.config import TournamentConfig, checked
+from berteam_cli.errors import InputError
+from berteam_cli.evaluation.tournament import Standings, tournament
+from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder, read_manifest
+from berteam_cli.games import Games
+from berteam_cli.outcomes import Ints
+from berteam_cli.population import policies
+from berteam_cli.recording import game_rows
+from berteam_cli.records import COLUMNS, team_name, team_names, write_table
+from berteam_cli.selector.base import SAMPLES, measured, team_count, unordered_teams
+from berteam_cli.training import RECORDS, generator
+
+log = logging.getLogger("berteam")
+
+MOST_GAMES = 10_000_000
+
+
+def play(config: TournamentConfig, text: str, folder: Path | None = None) -> None:
+    """Plays as configured and writes elo.csv, pairs.csv and games.csv.
+
+    Args:
+        config: checked.
+        text: the same as yaml, for the folder.
+        folder: None makes one.
+
+    Raises:
+        InputError: the config does not go together, or the folder is not free.
+    """
+    if config.on_exists == "resume":
+        raise InputError("on_exists=resume is for training runs; a tournament takes error or overwrite.")
+    games, acting, teams, names = of_run(config) if config.run else of_fixed_policies(config)
+    pairs = len(teams) * (len(teams) - 1) // 2
+    if pairs * config.games_per_pair > MOST_GAMES:
+        raise InputError(
+            f"{len(teams)} teams would play {pairs * config.games_per_pair:,} games; at most {MOST_GAMES:,}."
+        )
+    folder = folder or new_folder("tournament")
+    claim(folder, config.on_exists)
+    (folder / CONFIG).write_text(text, encoding="utf-8")
+    with logging_to(folder):
+        log.info("%s", folder)
+        manifest = Manifest(folder, seed=config.seed, teams=len(teams), pairs=pairs)
+        log.info("%d teams, %d pairs, %d games each.", len(teams), pairs, config.games_per_pair)
+        standings = tournament(games, acting, teams, config.games_per_pair, config.seed)
+        write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, names))
+        write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
+        write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
+        manifest.end("done")
+    show(folder, 10)
+
+
+def of_fixed_policies(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
+    """Returns the game, how its fixed policies act, all their teams, and their names.
+
+    Raises:
+        InputError: there are too many teams.
+    """
+    games = build.games(config)
+    names = games.env.fixed_policies
+    count = team_count(len(names), config.team_size)
+    if count * (count - 1) // 2 * config.games_per_pair > MOST_GAMES:
+        raise InputError(f"team_size={config.team_size} gives {count:,} teams, too many for every pair to play.")
+    return games, fixed_policies(range(len(names))), unordered_teams(len(names), config.team_size), list(names)
+
+
+def of_run(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
+    """Returns the game of a trained run, how its members act, its most probable teams, and the members' names.
+
+    Raises:
+        InputError: there is no such run.
+    """
+    folder = Path(str(config.run))
+    read_manifest(folder)
+    trained = checked(stored_config(folder))
+    trained.workers = config.workers
+    parts = build.parts(trained)
+    run = checkpoint.load(folder, parts).run
+    acting = policies(parts.optimizer.islands, run.population, explore=False)
+    found = measured(parts.selector, run.selection, SAMPLES, generator(parts.seed, RECORDS, run.epoch))
+    top = np.sort(np.argsort(-found.probability, kind="stable")[: config.top])
+    return parts.games, acting, found.teams[top], [name for i in parts.optimizer.islands for name in i.names]
+
+
+def elo_rows(standings: Standings, names: list[str]) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of elo.csv, the strongest team first; nobody predicted anything here."""
+    won, drawn, lost = standings.results.sum(axis=0).sum(axis=2)
+    for rank, k in enumerate(np.argsort(-standings.elos, kind="stable"), start=1):
+        elo, width, team = standings.elos[k], standings.half_widths[k], standings.teams[k]
+        yield (
+            *(team_name(team), " + ".join(names[m] for m in team), elo, elo - width, elo + width),
+            *(won[k] + drawn[k] + lost[k], won[k], drawn[k], lost[k], math.nan, rank, math.nan, math.nan),
+        )
+
+
+def pair_rows(standings: Standings) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of pairs.csv: each team against each other, apart for the side it played."""
+    names = team_names(standings.teams)
+    for k, team in enumerate(names):
+        for j, opponent in enumerate(names):
+            for side, color in enumerate(("blue", "red")):
+                counts = standings.results[side, :, k, j]
+                if counts.sum():
+                    yield team, opponent, counts.sum(), *counts, color

@@ -1,0 +1,186 @@
+"""Composes the configuration before Hydra does, so that wrong input is refused in one sentence and leaves no trace."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from hydra import compose, initialize_config_module
+from hydra._internal.utils import get_args_parser
+from hydra.core.global_hydra import GlobalHydra
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.core.override_parser.types import ChoiceSweep, Override
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from berteam_cli.config import checked, one_line, register
+from berteam_cli.errors import InputError, did_you_mean
+
+CONF = "berteam_cli.conf"
+HIDDEN = ("schema", "hydra")  # groups no user chooses from
+
+
+def prepare() -> None:
+    """Registers the schemas and the one resolver that the yaml files use."""
+    register()
+    OmegaConf.register_new_resolver("eighth_of", lambda epochs: int(epochs) // 8, replace=True)
+
+
+def arguments(words: list[str]) -> Any:
+    """Returns Hydra's reading of the command line after the sub-command.
+
+    Raises:
+        InputError: it has a flag that does not exist.
+    """
+    parser = get_args_parser()
+
+    def refuse(message: str) -> None:
+        raise InputError(f"{message}; see --help.")
+
+    parser.error = refuse  # type: ignore[assignment,method-assign]
+    return parser.parse_args(words)
+
+
+def check(command: str, words: list[str]) -> None:
+    """Composes what the command line asks for and checks it, every value of a sweep once.
+
+    Args:
+        command: name of the primary config.
+        words: the command line after the sub-command.
+
+    Raises:
+        InputError: a choice, a key or a value is wrong.
+    """
+    given = arguments(words)
+    searched = [f"hydra.searchpath=[file://{Path(given.config_dir).absolute()}]"] if given.config_dir else []
+    if given.config_dir and not Path(given.config_dir).is_dir():
+        raise InputError(f"--config-dir must be a folder, but {given.config_dir} is none.")
+    with initialize_config_module(CONF, version_base="1.3", job_name=command):
+        overrides = parsed(given.overrides)
+        if given.multirun and any(x.key_or_group == "out" for x in overrides):
+            raise InputError("out is one folder for all runs of a sweep; use hydra.sweep.dir=DIR instead.")
+        for override in overrides:
+            check_choice(override)
+        for job in jobs(overrides, sweep=given.multirun):
+            checked(composed(given.config_name or command, searched, job))
+
+
+def parsed(overrides: list[str]) -> list[Override]:
+    """Returns the overrides as Hydra reads them.
+
+    Raises:
+        InputError: one is not of the form key=value.
+    """
+    read: list[Override] = []
+    for text in overrides:
+        try:
+            read += OverridesParser.create().parse_overrides([text])
+        except HydraException as error:
+            raise InputError(
+                f"{text!r} cannot be read as key=value: {str(error).splitlines()[0].rstrip('.')}."
+            ) from error
+    return read
+
+
+def jobs(overrides: list[Override], *, sweep: bool) -> Iterator[list[Override]]:
+    """Yields lists of overrides in which every value of every sweep occurs once, the others at their first."""
+    plain = [x for x in overrides if not (sweep and x.is_sweep_override())]
+    values = [
+        parsed([f"{x.get_key_element()}={value}" for value in x.sweep_string_iterator()])
+        for x in overrides
+        if sweep and (x.is_choice_sweep() or x.is_range_sweep())
+    ]
+    first = [options[0] for options in values]
+    yield plain + first
+    for k, options in enumerate(values):
+        for other in options[1:]:
+            yield [*plain, *first[:k], other, *first[k + 1 :]]
+
+
+def composed(command: str, searched: list[str], overrides: list[Override]) -> DictConfig:
+    """Returns the config that ``overrides`` give.
+
+    Raises:
+        InputError: with what is wrong, and the nearest right key.
+    """
+    lines = [x.input_line for x in overrides if x.input_line is not None]
+    try:
+        return compose(command, overrides=[*searched, *lines])
+    except (HydraException, OmegaConfBaseException) as error:
+        check_keys(command, searched, overrides)
+        raise InputError(said(error)) from error
+
+
+def said(error: Exception) -> str:
+    """Returns in one line what Hydra or OmegaConf object to: the innermost cause says it best."""
+    while isinstance(error.__cause__, HydraException | OmegaConfBaseException):
+        error = error.__cause__
+    if isinstance(error, OmegaConfBaseException):
+        return one_line(error)
+    return f"{str(error).splitlines()[0].rstrip('.')}."
+
+
+def check_choice(override: Override) -> None:
+    """Checks an override of a config group against the choices there are.
+
+    Raises:
+        InputError: with the nearest choice.
+    """
+    group = override.key_or_group
+    allowed = choices(group)
+    if not allowed:
+        return
+    value = override.value()
+    given = value.list if isinstance(value, ChoiceSweep) else [value]
+    for item in given:
+        text = str(getattr(item, "text", item))
+        if item is not None and text not in allowed:
+            raise InputError.choice(group, text, allowed)
+
+
+def choices(group: str) -> list[str]:
+    """Returns the choices of a config group, none if there is no such group."""
+    if group.split("/", maxsplit=1)[0] == "schema":
+        return []
+    return sorted(GlobalHydra.instance().config_loader().get_group_options(group))
+
+
+def groups() -> list[str]:
+    """Returns the config groups a user chooses from."""
+    return [x for x in sorted(GlobalHydra.instance().config_loader().list_groups("")) if x not in HIDDEN]
+
+
+def check_keys(command: str, searched: list[str], overrides: list[Override]) -> None:
+    """Checks that every overridden key is there.
+
+    Raises:
+        InputError: one is not; with the nearest that is.
+    """
+    chosen = [x for x in overrides if choices(x.key_or_group)]
+    try:
+        config = compose(command, overrides=[*searched, *(x.input_line or "" for x in chosen)])
+    except (HydraException, OmegaConfBaseException):
+        return  # the choices themselves do not go together, and that error says more
+    known = keys(config)
+    for override in overrides:
+        key = override.key_or_group
+        if override in chosen or key.startswith("hydra"):
+            continue
+        if key not in known:
+            near = did_you_mean(key, [*known, *groups()])
+            raise InputError(f"{key} is no key of this configuration.{near} See --cfg job for all of them.")
+
+
+def keys(config: DictConfig, prefix: str = "") -> list[str]:
+    """Returns all dotted keys of a config."""
+    found: list[str] = []
+    for key in config:
+        path = f"{prefix}{key}"
+        found.append(path)
+        node = None if OmegaConf.is_missing(config, key) else config._get_node(key)
+        if isinstance(node, DictConfig) and not node._is_none():
+            target = config[key] if OmegaConf.is_interpolation(config, key) else node
+            found += keys(target, f"{path}.")
+    return found

@@ -1,0 +1,317 @@
+"""Schemas of the configuration: types and bounds, no values; the values stand in conf/, one yaml for each choice."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
+
+from hydra.core.config_store import ConfigStore
+from omegaconf import MISSING, DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from berteam_cli.errors import InputError
+
+LIMIT = 10**9  # above any size a run can have
+
+
+def number(low: float = 0, high: float = LIMIT, *, open_low: bool = False) -> Any:
+    """Declares a value in [low, high], or in (low, high] if ``open_low``."""
+    return field(default=MISSING, metadata={"low": low, "high": high, "open_low": open_low})
+
+
+def choice(*allowed: str) -> Any:
+    """Declares one of the words ``allowed``."""
+    return field(default=MISSING, metadata={"allowed": allowed})
+
+
+@dataclass
+class EnvConfig:
+    """What every game has."""
+
+    name: str = MISSING
+
+
+@dataclass
+class MctfConfig(EnvConfig):
+    """Settings of env/mctf.py; the meaning of each stands in mctf.rules."""
+
+    profile: str = choice("pyquaticus-2024-06")
+    reward: str = choice("custom_rew2", "custom_rew", "sparse")
+    world_size_m: list[float] = MISSING
+    flag_keepout_m: float = number()
+    catch_radius_m: float = number(open_low=True)
+    untag_radius_m: float | None = number(open_low=True)
+    agent_radius_m: float = number()
+    max_speed: float = number(open_low=True)
+    tau_s: float = number(open_low=True)
+    substeps: int = number(1)
+    max_time_s: float = number(open_low=True)
+    max_score: int = number(1)
+    tagging_cooldown_s: float = number(open_low=True)
+    oob_counts_as_tag: bool = MISSING
+
+
+@dataclass
+class RpsConfig(EnvConfig):
+    """Settings of env/rps.py."""
+
+
+@dataclass
+class SelectorConfig:
+    """What every selector has."""
+
+    name: str = MISSING
+    fitness: str = choice("elo", "moving_average")
+
+
+@dataclass
+class UniformConfig(SelectorConfig):
+    """Settings of selector/uniform.py."""
+
+    captain: str = choice("matching", "uniform")
+
+
+@dataclass
+class McaaConfig(SelectorConfig):
+    """Settings of selector/mcaa.py."""
+
+    learning_rate: float = number(open_low=True)
+    train_every: int = number(1)
+
+
+@dataclass
+class BerteamConfig(SelectorConfig):
+    """Settings of selector/berteam.py."""
+
+    captain: str = choice("matching", "uniform", "berteam")
+    weighting: bool = MISSING
+    weight_cap: float = number(open_low=True)
+    noise_half_life: float = number()
+    train_every: int = number(1)
+    batch_size: int = number(1)
+    minibatch_size: int = number(1)
+    capacity: int = number(1)
+    weight_half_life: float = number()
+    draw_weight: float = number(0, 1)
+    learning_rate: float = number(open_low=True)
+    layers: int = number(1, 64)
+    width: int = number(1, 8192)
+    heads: int = number(1, 1024)
+    dropout: float = number(0, 0.99)
+    position: str = choice("append", "add", "none")
+
+
+@dataclass
+class OptimizerConfig:
+    """What every optimizer has."""
+
+    name: str = MISSING
+    fitness: str = choice("elo", "moving_average")
+    captain_k: float = number()
+    member_k: float = number()
+    average_rate: float = number(0, 1, open_low=True)
+
+
+@dataclass
+class FixedOptimizerConfig(OptimizerConfig):
+    """Settings of optimizer/fixed.py."""
+
+
+@dataclass
+class CoevolutionConfig(OptimizerConfig):
+    """Settings of optimizer/coevolution.py."""
+
+    replacements: int = number()
+    elites: int = number()
+    protect_new: int = number()
+    draw_protected: bool = MISSING
+
+
+@dataclass
+class MapElitesConfig(CoevolutionConfig):
+    """Settings of optimizer/mapelites.py."""
+
+    radius: float = number(open_low=True)
+    opponents: list[str] = MISSING
+    probe_games: int = number(1)
+
+
+@dataclass
+class LearnerConfig:
+    """What every learner has."""
+
+    name: str = MISSING
+
+
+@dataclass
+class FixedLearnerConfig(LearnerConfig):
+    """Settings of learner/fixed.py."""
+
+    policies: list[str] = MISSING
+
+
+@dataclass
+class PpoConfig(LearnerConfig):
+    """Settings of learner/ppo.py."""
+
+    network: list[int] = MISSING
+    learning_rate: float = number(open_low=True)
+    n_steps: int = number(2)
+    minibatch_size: int = number(2)
+    n_epochs: int = number(1)
+    gamma: float = number(0, 1)
+    gae_lambda: float = number(0, 1)
+    clip_range: float = number(open_low=True)
+    entropy_coef: float = number()
+    value_coef: float = number()
+    max_grad_norm: float = number(open_low=True)
+    normalize_advantage: bool = MISSING
+
+
+@dataclass
+class DqnConfig(LearnerConfig):
+    """Settings of learner/dqn.py."""
+
+    network: list[int] = MISSING
+    learning_rate: float = number(open_low=True)
+    buffer_size: int = number(1)
+    batch_size: int = number(1)
+    gamma: float = number(0, 1)
+    train_freq: int = number(1)
+    gradient_steps: int = number(1)
+    learning_starts: int = number()
+    target_update_interval: int = number(1)
+    exploration_initial: float = number(0, 1)
+    exploration_final: float = number(0, 1)
+    exploration_steps: int = number(1)
+    max_grad_norm: float = number(open_low=True)
+
+
+@dataclass
+class IslandConfig:
+    """One island of the population."""
+
+    size: int = number(1, 100_000)
+    learner: LearnerConfig = MISSING
+
+
+@dataclass
+class PopulationConfig:
+    """The islands by name."""
+
+    islands: dict[str, IslandConfig] = MISSING
+
+
+@dataclass
+class EvaluationConfig:
+    """How the teams are rated when the training has ended; evaluation/truth.py."""
+
+    games: int | None = number()
+    games_per_pair: int = number(1)
+    reference_teams: int = number(1)
+
+
+@dataclass
+class CommandConfig:
+    """What every command that writes a folder has."""
+
+    seed: int = number(0, 2**63 - 1)
+    team_size: int = number(1, 512)
+    out: str | None = MISSING
+    on_exists: str = choice("error", "overwrite", "resume")
+    workers: int = number(0, 4096)
+    env: EnvConfig = MISSING
+
+
+@dataclass
+class TrainConfig(CommandConfig):
+    """Settings of ``berteam train``."""
+
+    epochs: int = number()
+    games_per_epoch: int = number(1)
+    device: str = choice("cpu", "cuda", "auto")
+    record_every: int = number(1)
+    record_teams: int = number(1)
+    checkpoint_every: int = number(1)
+    selector: SelectorConfig = MISSING
+    optimizer: OptimizerConfig = MISSING
+    population: PopulationConfig = MISSING
+    learner: LearnerConfig = MISSING
+    evaluation: EvaluationConfig = MISSING
+
+
+@dataclass
+class TournamentConfig(CommandConfig):
+    """Settings of ``berteam tournament``."""
+
+    run: str | None = MISSING
+    top: int = number(2)
+    games_per_pair: int = number(1)
+
+
+SCHEMAS: dict[str, dict[str, type]] = {
+    "env": {"mctf": MctfConfig, "rps": RpsConfig},
+    "selector": {"uniform": UniformConfig, "mcaa": McaaConfig, "berteam": BerteamConfig},
+    "optimizer": {"fixed": FixedOptimizerConfig, "coevolution": CoevolutionConfig, "mapelites": MapElitesConfig},
+    "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig},
+    "population": {"islands": PopulationConfig},
+    "evaluation": {"truth": EvaluationConfig},
+    "command": {"train": TrainConfig, "tournament": TournamentConfig},
+}
+
+
+def register() -> None:
+    """Puts the schemas where the yaml files name them: /schema/<group>/<name>."""
+    store = ConfigStore.instance()
+    for group, schemas in SCHEMAS.items():
+        for name, schema in schemas.items():
+            store.store(group=f"schema/{group}", name=name, node=schema)
+
+
+def checked(config: DictConfig) -> Any:
+    """Returns the composed ``config`` as objects of the schemas.
+
+    Raises:
+        InputError: a value is missing, of a wrong type or out of bounds.
+    """
+    try:
+        objects = OmegaConf.to_object(config)
+    except OmegaConfBaseException as error:
+        raise InputError(one_line(error)) from error
+    check_bounds(objects, "")
+    return objects
+
+
+def one_line(error: OmegaConfBaseException) -> str:
+    """Returns what OmegaConf objects to, with the key, in one line."""
+    said = str(error).splitlines()[0].rstrip(".")
+    key = getattr(error, "full_key", None)
+    return f"{key}: {said}." if key else f"{said}."
+
+
+def check_bounds(value: Any, key: str) -> None:
+    """Checks ``value`` and all below it against the bounds of its schema.
+
+    Raises:
+        InputError: with the key, what is allowed and what was given.
+    """
+    if isinstance(value, dict):
+        for name, item in value.items():
+            check_bounds(item, f"{key}.{name}")
+    if not is_dataclass(value):
+        return
+    for item in fields(value):
+        path = f"{key}.{item.name}".lstrip(".")
+        given = getattr(value, item.name)
+        check_bounds(given, path)
+        if given is None:
+            continue
+        if "allowed" in item.metadata and given not in item.metadata["allowed"]:
+            raise InputError.choice(path, given, item.metadata["allowed"])
+        if "low" in item.metadata:
+            low, high, open_low = (item.metadata[x] for x in ("low", "high", "open_low"))
+            if not (low < given if open_low else low <= given) or not given <= high or not math.isfinite(given):
+                above = f"> {low:g}" if open_low else f">= {low:g}"
+                below = f" and <= {high:g}" if high != LIMIT else ""
+                raise InputError(f"{path} must be {above}{below}, but is {given}.")

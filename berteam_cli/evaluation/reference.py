@@ -1,0 +1,77 @@
+"""The teams of fixed policies and their Elos: the yardstick that all runs share."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.resources
+import json
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from berteam_cli.acting import fixed_policies
+from berteam_cli.evaluation.tournament import tournament
+from berteam_cli.games import Games
+from berteam_cli.outcomes import Floats, Ints
+from berteam_cli.selector.base import unordered_teams
+
+log = logging.getLogger("berteam")
+
+GAMES_PER_PAIR = 8  # every order of the members of teams of two, from both sides
+SEED = 0  # one for all runs, so that they share the yardstick
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Teams of fixed policies and what they are worth.
+
+    Attributes:
+        teams: (J, T) fixed policies in ascending order.
+        elos: (J,) with mean 1000.
+        source: where the Elos come from, for the manifest.
+    """
+
+    teams: Ints
+    elos: Floats
+    source: str
+
+
+def fingerprint(games: Games) -> str:
+    """Returns eight hexadecimal digits that tell the game's settings from others."""
+    said = json.dumps(games.env.fingerprint(), sort_keys=True)
+    return hashlib.sha256(said.encode()).hexdigest()[:8]
+
+
+def reference_teams(policies: int, team_size: int, most: int) -> Ints:
+    """Returns the teams of fixed policies, (J, T): all of them, or ``most`` evenly spaced ones if they are more."""
+    teams = unordered_teams(policies, team_size)
+    if len(teams) <= most:
+        return teams
+    return teams[np.unique(np.linspace(0, len(teams) - 1, most).round().astype(int))]
+
+
+def reference(games: Games, most: int) -> Reference:
+    """Returns the teams of fixed policies and their Elos for this game.
+
+    A table shipped with the package is taken if it fits the settings; else the teams play a tournament now.
+
+    Args:
+        games: the game and its threads.
+        most: so many teams at most.
+    """
+    env = games.env
+    teams = reference_teams(len(env.fixed_policies), env.team_size, most)
+    name = f"{env.name}_{env.team_size}_{fingerprint(games)}.csv"
+    shipped = importlib.resources.files("berteam_cli.rating").joinpath(name)
+    if shipped.is_file():
+        with shipped.open(encoding="utf-8") as file:
+            table = pd.read_csv(file, dtype={"team": str}).set_index("team")
+        names = ["-".join(map(str, team)) for team in teams]
+        if set(names) <= set(table.index):
+            return Reference(teams, table.loc[names, "elo"].to_numpy(dtype=float), f"shipped table {name}")
+    log.info("No Elos of the fixed teams are shipped for these settings: %d teams play for them now.", len(teams))
+    acting = fixed_policies(range(len(env.fixed_policies)))
+    elos = tournament(games, acting, teams, GAMES_PER_PAIR, SEED).elos
+    return Reference(teams, elos, f"tournament of {len(teams)} teams, {GAMES_PER_PAIR} games a pair, seed {SEED}")

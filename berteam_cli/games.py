@@ -1,0 +1,99 @@
+"""Plays line-ups: from teams to outcomes and experience. The only place that hands games to threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from berteam_cli.acting import Policies
+from berteam_cli.env.base import Env, blank_results
+from berteam_cli.outcomes import NOBODY, Experience, Ints, Lineups, Outcomes
+from berteam_cli.workers import Workers
+from mctf.draws import seed_of
+
+GAMES_A_CALL = 8  # few enough that threads end together, enough that calling costs nothing
+
+
+@dataclass(frozen=True)
+class Games:
+    """A kind of game and the threads that play it.
+
+    Attributes:
+        env: the game.
+        workers: the threads.
+    """
+
+    env: Env
+    workers: Workers
+
+    def play(
+        self, policies: Policies, lineups: Lineups, key: int, *, record: bool = False
+    ) -> tuple[Outcomes, Experience]:
+        """Returns the outcomes of all ``lineups``, and what the players saw and did.
+
+        Every game draws from its own stream, made from ``key`` and its index, so that neither the number of threads nor
+        the other games change it.
+
+        Args:
+            policies: how the members of the line-ups act.
+            lineups: B games.
+            key: below 2**63; games of the same key and index draw the same.
+            record: whether anyone will learn; else the experience has no rows.
+        """
+        games = len(lineups)
+        players = np.ascontiguousarray(lineups.teams.reshape(games, -1))
+        seeds = seeds_of(key, games)
+        results = blank_results(self.env, games, record=record)
+        self.workers.map(
+            lambda start: self.env.play(
+                range(start, min(start + GAMES_A_CALL, games)), players, policies, seeds, results
+            ),
+            range(0, games, GAMES_A_CALL),
+        )
+        outcomes = Outcomes(lineups, results.scores, results.steps, results.events, seeds)
+        return outcomes, Experience(
+            players[: len(results.actions)],
+            results.observations,
+            results.actions,
+            results.rewards,
+            results.steps[: len(results.actions)],
+            results.terminated[: len(results.actions)],
+        )
+
+
+def seeds_of(key: int, games: int) -> np.ndarray:
+    """Returns (games,) uint64 the seed of each game of ``key``."""
+    return np.array([seed_of(np.uint64(key), np.uint64(b)) for b in range(games)], dtype=np.uint64)
+
+
+def pairings(blue: Ints, red: Ints) -> Lineups:
+    """Returns the line-ups of games between (B, T) teams ``blue`` and ``red``, without captains."""
+    teams = np.stack([blue, red], axis=1)
+    nobody = np.full(teams.shape[:2], NOBODY, dtype=np.int64)
+    return Lineups(teams, nobody, np.full(teams.shape[:2], np.nan))
+
+
+def both_sides(ours: Ints, theirs: Ints) -> Lineups:
+    """Returns games of (B, T) teams ``ours`` against ``theirs``: even games with us as side 0, odd ones as side 1."""
+    teams = np.stack([ours, theirs], axis=1)
+    teams[1::2] = teams[1::2, ::-1]
+    return pairings(teams[:, 0], teams[:, 1])
+
+
+def as_side_0(outcomes: Outcomes) -> Outcomes:
+    """Returns the outcomes of ``both_sides`` games with us as side 0 in every record."""
+
+    def turned(per_side: np.ndarray) -> np.ndarray:
+        per_side = per_side.copy()
+        per_side[1::2] = per_side[1::2, ::-1]
+        return per_side
+
+    lineups = outcomes.lineups
+    return Outcomes(
+        Lineups(turned(lineups.teams), turned(lineups.captains), turned(lineups.log_chances)),
+        turned(outcomes.scores),
+        outcomes.steps,
+        turned(outcomes.events),
+        outcomes.seeds,
+    )

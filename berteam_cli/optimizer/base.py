@@ -1,0 +1,63 @@
+"""What the loop asks of an optimizer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from numpy.random import Generator
+
+from berteam_cli.learner.base import Learning
+from berteam_cli.outcomes import Experience, Ints, Outcomes
+from berteam_cli.population import Island, Population
+
+
+@dataclass(frozen=True)
+class Replacement:
+    """One member that gave its place to a copy of another.
+
+    Attributes:
+        island: index of the island.
+        removed: the place.
+        parent: whose copy took it.
+        removed_fitness, parent_fitness: on the scale of the tables, before the replacement.
+        removed_age: epochs.
+        reason: the rule that chose the removed one.
+    """
+
+    island: int
+    removed: int
+    parent: int
+    removed_fitness: float
+    parent_fitness: float
+    removed_age: int
+    reason: str
+
+
+Probe = Callable[[Population, Ints, Ints], Outcomes]
+"""Plays probing games nobody learns from.
+
+Called with the population, the teams of the members (B, T), and the opposing fixed policies (B, T); returns outcomes
+with the members as side 0 in every record, half of the games played from either side of the field.
+"""
+
+
+class Optimizer(Protocol):
+    """Makes a population better from its games; keeps settings only."""
+
+    islands: tuple[Island, ...]
+
+    def rate(self, population: Population, outcomes: Outcomes) -> Population:
+        """Returns the population with the fitness that ``outcomes`` give."""
+
+    def train(
+        self, population: Population, experience: Experience, rng: Generator
+    ) -> tuple[Population, list[tuple[int, Learning]]]:
+        """Returns the population after each member learnt from its own steps, and what (island, figures)."""
+
+    def project(self, population: Population, probe: Probe) -> Population:
+        """Returns the population with its behaviour measured where this optimizer needs it."""
+
+    def renew(self, population: Population, rng: Generator) -> tuple[Population, list[Replacement]]:
+        """Returns the population one epoch older, after some members were replaced by copies of others."""

@@ -1,0 +1,110 @@
+"""Coevolutionary deep reinforcement learning (paper, Algorithm 1): learn, then clone the fit over the unfit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+
+from berteam_cli.learner.base import Learning
+from berteam_cli.optimizer.base import Replacement
+from berteam_cli.optimizer.fixed import Fixed
+from berteam_cli.outcomes import Experience, Floats, Ints
+from berteam_cli.population import Island, Population
+from berteam_cli.workers import Workers
+
+
+@dataclass(frozen=True)
+class Coevolution(Fixed):
+    """Members learn from their own steps; the least fit are replaced by copies of the fittest.
+
+    Attributes:
+        workers: threads that share the learning.
+        replacements: n_rem, at most so many members are replaced in an epoch, over all islands.
+        elites: so many of the fittest of each island are never replaced.
+        protect_new: a member of at most this age, in epochs, is never replaced.
+        draw_protected: whether protected members are drawn for removal, in vain, as in the published code; else the
+            draw is among those who can be replaced.
+    """
+
+    workers: Workers
+    replacements: int
+    elites: int
+    protect_new: int
+    draw_protected: bool
+
+    reason = "fitness"
+
+    def train(
+        self, population: Population, experience: Experience, rng: Generator
+    ) -> tuple[Population, list[tuple[int, Learning]]]:
+        """Returns the population after each member learnt from its own steps, and what (island, figures)."""
+        learnt = []
+        for i, (island, mind, stream) in enumerate(
+            zip(self.islands, population.minds, rng.spawn(len(self.islands)), strict=True)
+        ):
+            learnt += [(i, x) for x in island.learner.learn(mind, experience, island.first, stream, self.workers)]
+        return population, learnt
+
+    def renew(self, population: Population, rng: Generator) -> tuple[Population, list[Replacement]]:
+        """Returns the population one epoch older, after at most ``replacements`` members were replaced.
+
+        The islands are visited in random order. In each, members are drawn for removal without replacement and as
+        many parents with replacement; a protected member keeps its place (paper, section on coevolution).
+        """
+        population = replace(population, **{x: getattr(population, x).copy() for x in COPIED})
+        replaced: list[Replacement] = []
+        for i in rng.permutation(len(self.islands)):
+            left = self.replacements - len(replaced)
+            if left <= 0:
+                break
+            candidates, chances = self.removable(population, self.islands[i])
+            count = min(left, int((chances > 0).sum()))
+            if count == 0:
+                continue
+            removed = candidates[rng.choice(len(candidates), size=count, replace=False, p=chances)]
+            everyone = np.arange(self.islands[i].first, self.islands[i].first + self.islands[i].size)
+            likely = self.fitness.clone_chances(population.fitness[everyone])
+            parents = everyone[rng.choice(len(everyone), size=count, p=likely)]
+            for place, parent in zip(removed, parents, strict=True):
+                if population.age[place] > self.protect_new:
+                    replaced.append(self.replacement(population, int(i), int(place), int(parent)))
+        older, _ = super().renew(population, rng)
+        return older, replaced
+
+    def removable(self, population: Population, island: Island) -> tuple[Ints, Floats]:
+        """Returns (K,) members of ``island`` that may be drawn for removal, and (K,) their chances."""
+        candidates = self.candidates(population, island)
+        return candidates, self.fitness.removal_chances(population.fitness[candidates]) if len(candidates) else empty()
+
+    def candidates(self, population: Population, island: Island) -> Ints:
+        """Returns the members of ``island`` that are no elites, nor protected where those are not drawn."""
+        everyone = np.arange(island.first, island.first + island.size)
+        fittest_first = everyone[np.argsort(-population.fitness[everyone], kind="stable")]
+        candidates = np.sort(fittest_first[self.elites :])
+        return candidates if self.draw_protected else candidates[population.age[candidates] > self.protect_new]
+
+    def replacement(self, population: Population, i: int, place: int, parent: int) -> Replacement:
+        """Puts a copy of ``parent`` on ``place``; changes the arrays and minds of ``population``."""
+        fitness = self.fitness.shown(population.fitness[[place, parent]])
+        record = Replacement(
+            i, place, parent, float(fitness[0]), float(fitness[1]), int(population.age[place]), self.reason
+        )
+        first = self.islands[i].first
+        self.islands[i].learner.copy(population.minds[i], place - first, parent - first)
+        population.fitness[place] = population.fitness[parent]
+        population.behaviour[place] = population.behaviour[parent]
+        population.stale[place] = population.stale[parent]
+        population.age[place] = 0
+        population.games[place] = population.captain_games[place] = 0
+        population.parent[place] = parent
+        return record
+
+
+COPIED = ("fitness", "behaviour", "stale", "age", "games", "captain_games", "parent")
+
+
+def empty() -> Floats:
+    """Returns the chances of nobody."""
+    return np.zeros(0)

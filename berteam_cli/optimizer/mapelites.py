@@ -1,0 +1,70 @@
+"""MAP-Elites adapted to a coevolving population (paper, appendix on MAP-Elites).
+
+It is coevolution in which a member competes only with those that behave like it: who is unique is safe, and who is
+crowded is replaced by how far its fitness falls short of its neighbours' mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from berteam_cli.optimizer.aggression import aggression
+from berteam_cli.optimizer.base import Probe
+from berteam_cli.optimizer.coevolution import Coevolution, empty
+from berteam_cli.optimizer.removal import above_neighbours, crowded
+from berteam_cli.outcomes import Floats, Ints
+from berteam_cli.population import Island, Population
+
+
+@dataclass(frozen=True)
+class MapElites(Coevolution):
+    """Coevolution with local competition.
+
+    Attributes:
+        radius: lambda, in units of aggression: who has nobody nearer is unique.
+        opponents: (J, T) teams of fixed policies against which aggression is measured.
+        probe_games: games against each of them.
+    """
+
+    radius: float
+    opponents: Ints
+    probe_games: int
+
+    reason = "local fitness"
+
+    def project(self, population: Population, probe: Probe) -> Population:
+        """Returns the population with the aggression of the members that may matter now.
+
+        Measured are members that played since their last measurement, on islands where somebody is old enough to be
+        replaced. A member is measured as a team made only of itself.
+        """
+        due = np.concatenate(
+            [
+                island.first + np.flatnonzero(population.stale[island.members])
+                for island in self.islands
+                if (population.age[island.members] > self.protect_new).any()
+            ]
+            or [np.zeros(0, dtype=np.int64)]
+        )
+        if len(due) == 0:
+            return population
+        games = len(self.opponents) * self.probe_games
+        teams = np.repeat(due, games)[:, np.newaxis].repeat(self.opponents.shape[1], axis=1)
+        others = np.tile(np.repeat(self.opponents, self.probe_games, axis=0), (len(due), 1))
+        measured = aggression(probe(population, teams, others)).reshape(len(due), games).mean(axis=1)
+        behaviour, stale = population.behaviour.copy(), population.stale.copy()
+        behaviour[due], stale[due] = measured, False
+        return replace(population, behaviour=behaviour, stale=stale)
+
+    def removable(self, population: Population, island: Island) -> tuple[Ints, Floats]:
+        """Returns (K,) crowded members of ``island``, and (K,) their chances to be drawn for removal."""
+        if not (population.age[island.members] > self.protect_new).any():
+            return np.zeros(0, dtype=np.int64), empty()
+        unsafe = island.first + np.flatnonzero(crowded(population.behaviour[island.members], self.radius))
+        candidates = np.intersect1d(self.candidates(population, island), unsafe)
+        if len(candidates) == 0:
+            return candidates, empty()
+        better = above_neighbours(population.fitness[candidates], population.behaviour[candidates], self.radius)
+        return candidates, self.fitness.removal_chances(better)

@@ -1,0 +1,102 @@
+"""Records of who played, what came of it and what the players saw.
+
+Shape letters, here and in every docstring of the package: B games, S sides, T places in a team,
+V = S * T players of a game (side 0 first), N members of the population, I islands, M members of one
+island, L steps of the longest game, O numbers of an observation, A actions, K teams or rows.
+Side 0 is blue, side 1 is red.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+OPEN = -1  # a place nobody holds yet
+NOBODY = -1  # no captain, no parent
+
+EVENTS = ("captures", "grabs", "tags", "wall_hits")  # what a game counts for each side
+
+
+@dataclass(frozen=True)
+class Lineups:
+    """Who plays whom.
+
+    Attributes:
+        teams: (B, S, T) members.
+        captains: (B, S) members, NOBODY where a side has no captain.
+        log_chances: (B, S) ln of the probability with which the selector makes this ordered team,
+            over all the ways it could have come about; NaN where the selector was not asked for it.
+    """
+
+    teams: Ints
+    captains: Ints
+    log_chances: Floats
+
+    def __len__(self) -> int:
+        return len(self.teams)
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """What came of a batch of games.
+
+    Attributes:
+        lineups: who played.
+        scores: (B, S) 1 for a win, 0.5 for a draw, 0 for a loss.
+        steps: (B,) length of each game.
+        events: (B, S, len(EVENTS)) counts.
+        seeds: (B,) uint64, the stream each game drew from.
+    """
+
+    lineups: Lineups
+    scores: Floats
+    steps: Ints
+    events: Ints
+    seeds: npt.NDArray[np.uint64]
+
+    @property
+    def winners(self) -> Ints:
+        """(K, T) teams that won, games in order; a draw has none."""
+        return self.lineups.teams[self.scores == 1.0]
+
+    def event(self, name: str) -> Ints:
+        """Returns (B, S) how often ``name``, one of EVENTS, happened to each side."""
+        return self.events[:, :, EVENTS.index(name)]
+
+
+@dataclass(frozen=True)
+class Experience:
+    """What every player of a batch of games saw, did and was paid for.
+
+    Attributes:
+        members: (B, V) who played.
+        observations: (B, V, L + 1, O) float32; row ``lengths[b]`` is what was seen after the last step.
+        actions: (B, V, L) int16.
+        rewards: (B, V, L) float32.
+        lengths: (B,) steps of each game; later rows hold no meaning.
+        terminated: (B,) whether the rules ended the game; else time ran out.
+    """
+
+    members: Ints
+    observations: npt.NDArray[np.float32]
+    actions: npt.NDArray[np.int16]
+    rewards: npt.NDArray[np.float32]
+    lengths: Ints
+    terminated: Bools
+
+    def trajectories(self, first: int, size: int) -> list[tuple[int, int, int]]:
+        """Returns (row, game, player) of every trajectory of members ``first`` to ``first + size - 1``.
+
+        ``row`` counts from ``first``. They are sorted by row, then game, then player, so that a member with
+        several places in one game contributes each of them, one after the other.
+        """
+        game, player = np.nonzero((self.members >= first) & (self.members < first + size))
+        row = self.members[game, player] - first
+        order = np.lexsort((player, game, row))
+        return [(int(row[k]), int(game[k]), int(player[k])) for k in order]

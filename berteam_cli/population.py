@@ -1,0 +1,115 @@
+"""The population: its islands (settings) and its members (state)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from berteam_cli.acting import Policies, joined
+from berteam_cli.learner.base import Learner
+from berteam_cli.outcomes import NOBODY, Bools, Floats, Ints, Outcomes
+
+
+@dataclass(frozen=True)
+class Island:
+    """Members that learn in the same way and replace each other.
+
+    Attributes:
+        name: of the island.
+        first: index of its first member in the population.
+        size: M, how many members it has.
+        learner: how they learn.
+        names: of its members.
+    """
+
+    name: str
+    first: int
+    size: int
+    learner: Learner[Any]
+    names: tuple[str, ...]
+
+    @property
+    def members(self) -> slice:
+        """Where its members stand in an array over the population."""
+        return slice(self.first, self.first + self.size)
+
+
+@dataclass(frozen=True)
+class Population:
+    """What is known of N members; a member is a place that a copy of another may take over.
+
+    Attributes:
+        minds: one learner's state for each island.
+        fitness: (N,) on the scale of the fitness rule: nats of Elo, or a mean score in [0, 1].
+        age: (N,) epochs since the place was last taken over.
+        games: (N,) games played since then, a game on both sides counted twice.
+        captain_games: (N,) of them as captain.
+        parent: (N,) whose copy the member is, NOBODY for those of the beginning.
+        behaviour: (N,) aggression as last measured, NaN before.
+        stale: (N,) whether the member played since its behaviour was measured.
+    """
+
+    minds: tuple[Any, ...]
+    fitness: Floats
+    age: Ints
+    games: Ints
+    captain_games: Ints
+    parent: Ints
+    behaviour: Floats
+    stale: Bools
+
+    @property
+    def size(self) -> int:
+        """N."""
+        return len(self.fitness)
+
+
+ARRAYS = ("fitness", "age", "games", "captain_games", "parent", "behaviour", "stale")
+
+
+def founded(islands: tuple[Island, ...], fitness: float, rng: Generator) -> Population:
+    """Returns the population before the first epoch, everyone with the same ``fitness``."""
+    members = sum(island.size for island in islands)
+    streams = rng.spawn(len(islands))
+    return Population(
+        minds=tuple(i.learner.init(i.size, stream) for i, stream in zip(islands, streams, strict=True)),
+        fitness=np.full(members, fitness),
+        age=np.zeros(members, dtype=np.int64),
+        games=np.zeros(members, dtype=np.int64),
+        captain_games=np.zeros(members, dtype=np.int64),
+        parent=np.full(members, NOBODY, dtype=np.int64),
+        behaviour=np.full(members, np.nan),
+        stale=np.ones(members, dtype=np.bool_),
+    )
+
+
+def island_of(islands: tuple[Island, ...]) -> Ints:
+    """Returns (N,) the island of each member."""
+    return np.repeat(np.arange(len(islands)), [island.size for island in islands])
+
+
+def policies(islands: tuple[Island, ...], population: Population, *, explore: bool) -> Policies:
+    """Returns how every member acts; without ``explore`` as it is evaluated."""
+    return joined(
+        [island.learner.policies(mind, explore=explore) for island, mind in zip(islands, population.minds, strict=True)]
+    )
+
+
+def counted(population: Population, outcomes: Outcomes) -> Population:
+    """Returns the population with the games of ``outcomes`` added to its counters."""
+    size = population.size
+    places = np.bincount(outcomes.lineups.teams.ravel(), minlength=size)
+    # A member that holds two places of one team plays one game for that side.
+    sides = np.sort(outcomes.lineups.teams.reshape(-1, outcomes.lineups.teams.shape[-1]), axis=1)
+    first = np.ones(sides.shape, dtype=np.bool_)
+    first[:, 1:] = sides[:, 1:] != sides[:, :-1]
+    captains = outcomes.lineups.captains.ravel()
+    return replace(
+        population,
+        games=population.games + np.bincount(sides[first], minlength=size),
+        captain_games=population.captain_games + np.bincount(captains[captains != NOBODY], minlength=size),
+        stale=population.stale | (places > 0),
+    )

@@ -1,0 +1,119 @@
+"""From a run to the rows of its tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from berteam_cli.learner.base import LEARNING_FIGURES
+from berteam_cli.outcomes import Outcomes
+from berteam_cli.population import island_of
+from berteam_cli.records import COLUMNS, Tables, team_name, team_names
+from berteam_cli.selector.base import TeamDistribution, measured
+from berteam_cli.training import RECORDS, Clock, Parts, Report, Run, generator
+
+Row = tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Recorder:
+    """Writes a run into its tables.
+
+    Attributes:
+        tables: of the run folder.
+        parts: of the run.
+        every: epochs between two records of members and distributions.
+        most_teams: above so many possible teams their distribution is sampled.
+    """
+
+    tables: Tables
+    parts: Parts
+    every: int
+    most_teams: int
+
+    def first(self, run: Run) -> None:
+        """Records the members and distributions before the first epoch, as epoch 0."""
+        self.state(run, self.distribution(run))
+
+    def epoch(self, run: Run, report: Report, *, last: bool) -> None:
+        """Records an epoch, and after every ``every``-th and the ``last`` one the state it led to."""
+        clock = Clock()
+        selecting = report.selecting
+        entropy = effective = math.nan
+        if last or run.epoch % self.every == 0:
+            distribution = self.distribution(run)
+            self.state(run, distribution)
+            entropy, effective = distribution.entropy, math.exp(distribution.entropy)
+        self.tables.add("games", game_rows(run.epoch, report.outcomes))
+        self.tables.add("learning", self.learning_rows(run, report))
+        self.tables.add("generations", self.generation_rows(run, report))
+        self.tables.add(
+            "selector", [(run.epoch, selecting.loss, selecting.updates, selecting.buffer, effective, entropy)]
+        )
+        clock.lap("record_s")
+        seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
+        self.tables.add("timing", [tuple(seconds[column] for column in COLUMNS["timing"])])
+
+    def distribution(self, run: Run) -> TeamDistribution:
+        """Returns the distribution over teams after ``run.epoch`` epochs."""
+        rng = generator(self.parts.seed, RECORDS, run.epoch)
+        return measured(self.parts.selector, run.selection, self.most_teams, rng)
+
+    def state(self, run: Run, distribution: TeamDistribution) -> None:
+        """Records the members and the distributions over teams, captains and islands."""
+        self.tables.add("agents", self.agent_rows(run))
+        rows = [(run.epoch, *row) for row in zip(team_names(distribution.teams), distribution.probability, strict=True)]
+        if distribution.samples:
+            rows.append((run.epoch, "other", distribution.other))
+        self.tables.add("team_distribution", rows)
+        captains = self.parts.selector.captains(run.selection)
+        self.tables.add("captain_distribution", ((run.epoch, n, chance) for n, chance in enumerate(captains)))
+        islands = self.parts.optimizer.islands
+        shares = np.bincount(island_of(islands), weights=captains, minlength=len(islands))
+        self.tables.add(
+            "island_distribution", ((run.epoch, i.name, share) for i, share in zip(islands, shares, strict=True))
+        )
+
+    def agent_rows(self, run: Run) -> Iterator[Row]:
+        """Returns one row for each member."""
+        people = run.population
+        fitness = self.parts.optimizer.fitness.shown(people.fitness)
+        for island in self.parts.optimizer.islands:
+            for row in range(island.size):
+                n = island.first + row
+                yield (
+                    *(run.epoch, n, island.names[row], island.name, island.learner.algorithm, fitness[n]),
+                    *(people.age[n], people.games[n], people.captain_games[n], people.parent[n], people.behaviour[n]),
+                )
+
+    def learning_rows(self, run: Run, report: Report) -> Iterator[Row]:
+        """Returns one row for each member that had steps or updates."""
+        for i, learnt in report.learnt:
+            island = self.parts.optimizer.islands[i]
+            figures = (getattr(learnt, name) for name in LEARNING_FIGURES)
+            yield (run.epoch, island.first + learnt.row, island.learner.algorithm, *figures)
+
+    def generation_rows(self, run: Run, report: Report) -> Iterator[Row]:
+        """Returns one row for each replacement."""
+        for x in report.replaced:
+            name = self.parts.optimizer.islands[x.island].name
+            yield (
+                *(run.epoch, name, x.removed, x.parent, x.removed_fitness, x.parent_fitness),
+                *(x.removed_age, x.reason),
+            )
+
+
+def game_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:
+    """Returns one row for each game."""
+    lineups = outcomes.lineups
+    captures, grabs, tags, walls = (outcomes.event(x) for x in ("captures", "grabs", "tags", "wall_hits"))
+    for b in range(len(lineups)):
+        yield (
+            *(epoch, b, team_name(lineups.teams[b, 0]), team_name(lineups.teams[b, 1])),
+            *(*lineups.captains[b], *outcomes.scores[b], outcomes.steps[b]),
+            *(*captures[b], *grabs[b], *tags[b], outcomes.seeds[b], *walls[b]),
+        )

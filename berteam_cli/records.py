@@ -1,0 +1,114 @@
+"""The tables of a run: their columns, and how they are written.
+
+Columns are a contract with whoever reads them: they are only ever added, at the end. docs/csv.md tells what each means.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from berteam_cli.learner.base import LEARNING_FIGURES
+from berteam_cli.outcomes import Ints
+
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "elo": (
+        *("team", "members", "elo", "elo_low", "elo_high", "games", "wins", "draws", "losses"),
+        *("probability", "rank", "predicted_elo", "predicted_rank"),
+    ),
+    "agents": (
+        *("epoch", "agent", "name", "island", "algorithm", "fitness", "age", "games", "captain_games", "parent"),
+        "aggression",
+    ),
+    "team_distribution": ("epoch", "team", "probability"),
+    "captain_distribution": ("epoch", "agent", "probability"),
+    "island_distribution": ("epoch", "island", "probability"),
+    "games": (
+        *("epoch", "game", "blue", "red", "blue_captain", "red_captain", "blue_score", "red_score", "steps"),
+        *("blue_captures", "red_captures", "blue_grabs", "red_grabs", "blue_tags", "red_tags", "seed"),
+        *("blue_wall_hits", "red_wall_hits"),
+    ),
+    "generations": (
+        *("epoch", "island", "removed", "parent", "removed_fitness", "parent_fitness", "removed_age", "reason"),
+    ),
+    "learning": ("epoch", "agent", "algorithm", *LEARNING_FIGURES),
+    "selector": ("epoch", "loss", "updates", "buffer", "effective_teams", "entropy"),
+    "timing": (
+        *("epoch", "select_s", "play_s", "learn_s", "renew_s", "selector_s", "record_s", "env_steps", "probe_s"),
+    ),
+    "summary": (
+        *("expected_elo", "expected_elo_low", "expected_elo_high", "best_team", "best_elo"),
+        *("games", "env_steps", "wall_s", "peak_rss_mib"),
+    ),
+    "pairs": ("team", "opponent", "games", "wins", "draws", "losses", "side"),
+}
+GROWING = (
+    *("agents", "team_distribution", "captain_distribution", "island_distribution"),
+    *("games", "generations", "learning", "selector", "timing"),
+)
+"""Tables that get rows in every epoch, or in every recorded one."""
+
+
+def team_name(team: Iterable[int]) -> str:
+    """Returns a team as the tables write it: its members in ascending order, joined by hyphens."""
+    return "-".join(str(member) for member in sorted(int(m) for m in team))
+
+
+def team_names(teams: Ints) -> list[str]:
+    """Returns the names of (K, T) teams."""
+    return [team_name(team) for team in teams]
+
+
+def cell(value: Any) -> Any:
+    """Returns ``value`` as it is written: floats so that they read back equal, nothing where there is no number."""
+    if isinstance(value, float):  # numpy's floats are floats too
+        return "" if math.isnan(value) else repr(float(value))
+    return value
+
+
+class Tables:
+    """The growing tables of one run folder, open for appending."""
+
+    def __init__(self, folder: Path, sizes: dict[str, int] | None = None) -> None:
+        """Opens the tables.
+
+        Args:
+            folder: of the run.
+            sizes: bytes of each table to keep, from a checkpoint; None starts them anew.
+        """
+        self.files = {}
+        for name in GROWING:
+            path = folder / f"{name}.csv"
+            if sizes is None:
+                path.write_text(",".join(COLUMNS[name]) + "\n", encoding="utf-8")
+            else:
+                os.truncate(path, sizes[name])
+            self.files[name] = path.open("a", encoding="utf-8", newline="")
+
+    def add(self, name: str, rows: Iterable[Sequence[Any]]) -> None:
+        """Appends ``rows`` to table ``name``; they are in the file when this returns."""
+        csv.writer(self.files[name], lineterminator="\n").writerows([cell(v) for v in row] for row in rows)
+        self.files[name].flush()
+
+    def sizes(self) -> dict[str, int]:
+        """Returns the bytes of each table."""
+        return {name: file.tell() for name, file in self.files.items()}
+
+    def close(self) -> None:
+        """Closes the files."""
+        for file in self.files.values():
+            file.close()
+
+
+def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Writes a whole table; there is never half of one under ``path``."""
+    part = path.with_suffix(".part")
+    with part.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([cell(v) for v in row] for row in rows)
+    os.replace(part, path)

@@ -1,0 +1,140 @@
+"""The training loop: the paper's Algorithm 1, with the selector that learns beside it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.random import Generator
+
+from berteam_cli.acting import fixed_policies, joined
+from berteam_cli.games import Games, as_side_0, both_sides
+from berteam_cli.learner.base import Learning
+from berteam_cli.optimizer.base import Optimizer, Replacement
+from berteam_cli.outcomes import Ints, Outcomes
+from berteam_cli.population import Population, founded, policies
+from berteam_cli.selector.base import Selecting, Selector
+
+FOUNDING, EPOCHS, RECORDS, EVALUATION = range(4)  # what a stream of random numbers is for
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What does not change in a run."""
+
+    seed: int
+    games_per_epoch: int
+    games: Games
+    selector: Selector[Any]
+    optimizer: Optimizer
+
+
+@dataclass(frozen=True)
+class Run:
+    """What changes: all that the next epoch depends on.
+
+    Attributes:
+        epoch: how many are done.
+        population: the members.
+        selection: what the selector has learnt.
+        played: games of all epochs.
+        steps: of those games and of the probing games.
+    """
+
+    epoch: int
+    population: Population
+    selection: Any
+    played: int = 0
+    steps: int = 0
+
+
+@dataclass
+class Report:
+    """What happened in one epoch, for the tables."""
+
+    outcomes: Outcomes
+    learnt: list[tuple[int, Learning]] = field(default_factory=list)
+    replaced: list[Replacement] = field(default_factory=list)
+    selecting: Selecting = field(default_factory=Selecting)
+    env_steps: int = 0
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+def generator(seed: int, purpose: int, epoch: int = 0) -> Generator:
+    """Returns the source of chance for one purpose in one epoch; nothing else draws from it."""
+    return np.random.default_rng([seed, purpose, epoch])
+
+
+def begin(parts: Parts) -> Run:
+    """Returns the run before its first epoch."""
+    people, selection = generator(parts.seed, FOUNDING).spawn(2)
+    population = founded(parts.optimizer.islands, parts.optimizer.fitness.initial, people)
+    return Run(0, population, parts.selector.init(selection))
+
+
+def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
+    """Selects teams, plays, rates, learns, renews, and learns to select (paper, Algorithm 1)."""
+    select, play, learn, probe, renew, study = generator(parts.seed, EPOCHS, run.epoch).spawn(6)
+    selector, optimizer, population = parts.selector, parts.optimizer, run.population
+    clock = Clock()
+
+    lineups = selector.select(run.selection, parts.games_per_epoch, population.age, select)
+    clock.lap("select_s")
+    acting = policies(optimizer.islands, population, explore=True)
+    outcomes, experience = parts.games.play(acting, lineups, key(play), record=True)
+    population = optimizer.rate(population, outcomes)
+    clock.lap("play_s")
+    population, learnt = optimizer.train(population, experience, learn)
+    clock.lap("learn_s")
+    probes = Probes(parts, key(probe))
+    population = optimizer.project(population, probes.play)
+    clock.lap("probe_s")
+    population, replaced = optimizer.renew(population, renew)
+    clock.lap("renew_s")
+    selection, selecting = selector.learn(run.selection, outcomes, study)
+    clock.lap("selector_s")
+
+    steps = int(outcomes.steps.sum()) + probes.steps
+    after = Run(run.epoch + 1, population, selection, run.played + len(lineups), run.steps + steps)
+    return after, Report(outcomes, learnt, replaced, selecting, steps, clock.laps)
+
+
+def key(rng: Generator) -> int:
+    """Returns the key from which the games of one batch make their own streams."""
+    return int(rng.integers(2**63))
+
+
+@dataclass
+class Probes:
+    """Games that measure how members behave; nobody learns from them and no table lists them."""
+
+    parts: Parts
+    key: int
+    steps: int = 0
+
+    def play(self, population: Population, teams: Ints, opponents: Ints) -> Outcomes:
+        """Returns the outcomes with ``teams`` as side 0; see ``optimizer.base.Probe``."""
+        env = self.parts.games.env
+        members = policies(self.parts.optimizer.islands, population, explore=False)
+        acting = joined([members, fixed_policies(range(len(env.fixed_policies)))])
+        lineups = both_sides(teams, opponents + population.size)
+        outcomes, _ = self.parts.games.play(acting, lineups, self.key)
+        self.steps += int(outcomes.steps.sum())
+        return as_side_0(outcomes)
+
+
+class Clock:
+    """Tells how long each part of an epoch took, in seconds."""
+
+    def __init__(self) -> None:
+        """Starts."""
+        self.laps: dict[str, float] = {}
+        self.last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        """Ends part ``name``, which began when the one before ended."""
+        now = time.perf_counter()
+        self.laps[name] = now - self.last
+        self.last = now
