@@ -144,10 +144,12 @@ SAMPLES = 20_000  # teams drawn where they are too many to list
 def measured(selector: Selector[Any], state: Any, most: int, rng: Generator) -> TeamDistribution:
     """Returns the distribution over teams: exact if there are at most ``most``, else that of SAMPLES drawn ones.
 
-    A sampled distribution lists the ``most`` most frequent teams; the rest is its ``other``.
+    A sampled distribution lists the ``most`` most frequent teams; the rest is its ``other``. It is sampled too where
+    the ordered teams, whose number decides what an exact one costs, are more than 20 for each of ``most``.
     """
     field = selector.field
-    if team_count(field.members, field.team_size) <= most:
+    ordered = field.members**field.team_size
+    if team_count(field.members, field.team_size) <= most and ordered <= 20 * most:
         return selector.distribution(state)
     drawn = np.sort(selector.sample(state, SAMPLES, rng), axis=1)
     teams, counts = np.unique(drawn, axis=0, return_counts=True)

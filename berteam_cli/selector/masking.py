@@ -1,0 +1,53 @@
+"""Learning by masking: hide members of winning teams and let the network guess them.
+
+Paper, Section 3, "Training Procedure"; the masks are those of BERT.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from numpy.random import Generator
+from torch import Tensor
+
+from berteam_cli.outcomes import OPEN, Bools, Ints
+
+SHOWN_AS_MASK = 0.8  # of the hidden places; BERT's shares
+SHOWN_AS_ANYONE = 0.1  # the rest is shown as it is
+
+
+def masked(teams: Ints, members: int, rng: Generator) -> tuple[Ints, Bools]:
+    """Returns (K, T) teams as the network sees them and (K, T) which places it must guess.
+
+    Each team draws a share q from {0, 1/T, ..., 1}, each of its places is hidden with chance q, and one place,
+    chosen uniformly, in any case. So every number of hidden places, as it comes about in filling, is trained.
+
+    Args:
+        teams: (K, T), no place OPEN.
+        members: N.
+        rng: the only source of chance.
+    """
+    count, size = teams.shape
+    share = rng.integers(size + 1, size=(count, 1)) / size
+    hidden = rng.random((count, size)) < share
+    hidden[np.arange(count), rng.integers(size, size=count)] = True
+
+    kind = rng.random((count, size))
+    anyone = rng.integers(members, size=(count, size))
+    shown = np.where(kind < SHOWN_AS_MASK + SHOWN_AS_ANYONE, anyone, teams)
+    shown = np.where(kind < SHOWN_AS_MASK, OPEN, shown)
+    return np.where(hidden, shown, teams), hidden
+
+
+def guessing_loss(logits: Tensor, teams: Tensor, hidden: Tensor, weights: Tensor) -> Tensor:
+    """Returns the mean over teams of weight times the mean cross-entropy of the hidden places, in nats.
+
+    Args:
+        logits: (K, T, N).
+        teams: (K, T) the true members.
+        hidden: (K, T) bool, at least one in each row.
+        weights: (K,), mean 1.
+    """
+    surprise = -torch.log_softmax(logits, dim=-1).gather(-1, teams[..., None])[..., 0]  # (K, T)
+    per_team = (surprise * hidden).sum(dim=1) / hidden.sum(dim=1)
+    return (weights * per_team).mean()

@@ -1,0 +1,100 @@
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from berteam_cli.outcomes import OPEN
+from berteam_cli.selector.filling import drawn, filled, noise, towards_uniform
+
+
+def test_noise_by_hand():
+    np.testing.assert_allclose(noise(np.array([0, 400, 800, 200]), 400.0), [1, 0.5, 0.25, 0.5**0.5])
+    np.testing.assert_array_equal(noise(np.array([0, 7]), 0.0), [0, 0])
+
+
+def test_towards_uniform_by_hand():
+    # (1 - 1) 0.7 + 1/3, (1 - 0.5) 0.1 + 0.5/3, 0.2; their sum is 0.75.
+    expected = np.array([1 / 3, 0.05 + 0.5 / 3, 0.2]) / 0.75
+    np.testing.assert_allclose(towards_uniform(np.array([[0.7, 0.1, 0.2]]), np.array([1, 0.5, 0])), [expected])
+
+
+def test_noise_makes_all_new_members_equally_likely_and_trusts_the_network_about_old_ones():
+    odds = np.random.default_rng(0).dirichlet(np.ones(5), size=3)
+    np.testing.assert_allclose(towards_uniform(odds, np.ones(5)), 0.2)
+    np.testing.assert_allclose(towards_uniform(odds, np.zeros(5)), odds)
+
+
+def test_drawn_columns_come_as_often_as_their_chances_say():
+    chances = np.array([0.0, 3.0, 0.0, 1.0, 0.0])  # in proportion, not normalised
+    columns = drawn(np.tile(chances, (40_000, 1)), np.random.default_rng(0))
+    share = np.bincount(columns, minlength=5) / 40_000
+    assert share[[0, 2, 4]].sum() == 0
+    np.testing.assert_allclose(share, chances / 4, atol=5 * np.sqrt(0.75 * 0.25 / 40_000))
+
+
+def test_extreme_draws_find_columns_with_a_chance():
+    class Extreme:
+        def __init__(self, value):
+            self.value = value
+
+        def random(self, shape):
+            return np.full(shape, self.value)
+
+    chances = np.array([[0.0, 0.1, 0.2, 0.7 - 1e-17, 0.0]])
+    assert drawn(chances, Extreme(0.0)) == 1
+    assert drawn(chances, Extreme(np.nextafter(1, 0))) == 3
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(1, 6), st.integers(1, 4), st.integers(0, 2**32 - 1), st.data())
+def test_property_held_places_stay_and_open_ones_get_members(members, size, seed, data):
+    rng = np.random.default_rng(seed)
+    teams = rng.integers(members, size=(5, size))
+    held = data.draw(st.integers(0, size))
+    open_ = np.argsort(rng.random((5, size)), axis=1) >= held
+    teams[open_] = OPEN
+    before = teams.copy()
+
+    def odds(partial):
+        assert np.all((partial >= OPEN) & (partial < members))
+        return rng.dirichlet(np.ones(members), size=partial.shape)
+
+    full = filled(odds, teams, np.zeros(members), rng)
+    assert np.array_equal(full[~open_], before[~open_])
+    assert np.all((full >= 0) & (full < members))
+    assert np.array_equal(teams, before)
+
+
+def test_the_network_is_asked_once_per_place_and_never_twice_about_one_team():
+    asked = []
+
+    def odds(partial):
+        assert len(np.unique(partial, axis=0)) == len(partial)
+        asked.append(len(partial))
+        return np.full((*partial.shape, 4), 0.25)
+
+    filled(odds, np.full((1000, 3), OPEN), np.zeros(4), np.random.default_rng(0))
+    assert asked == [1, 3 * 4, 3 * 4 * 4]
+
+
+def test_every_order_of_filling_is_equally_likely():
+    # Member k is the k-th to come, so a team tells the order it was filled in.
+    def odds(partial):
+        step = (partial != OPEN).sum(axis=1)
+        return np.repeat(np.eye(3)[step][:, np.newaxis], 3, axis=1)
+
+    teams = filled(odds, np.full((30_000, 3), OPEN), np.zeros(3), np.random.default_rng(1))
+    orders, counts = np.unique(teams, axis=0, return_counts=True)
+    assert len(orders) == 6
+    np.testing.assert_allclose(counts / 30_000, 1 / 6, atol=5 * np.sqrt(5 / 36 / 30_000))
+
+
+def test_noise_is_applied_to_every_place():
+    def odds(partial):
+        return np.broadcast_to(np.eye(4)[0], (*partial.shape, 4)).copy()
+
+    doubt = np.array([0.5, 0.25, 0, 0])
+    expected = towards_uniform(np.eye(4)[0], doubt)
+    teams = filled(odds, np.full((20_000, 2), OPEN), doubt, np.random.default_rng(2))
+    for place in range(2):
+        share = np.bincount(teams[:, place], minlength=4) / 20_000
+        np.testing.assert_allclose(share, expected, atol=5 * 0.5 / np.sqrt(20_000))
