@@ -67,9 +67,8 @@ def run(word: str, words: list[str]) -> None:
     """
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
-    {"train": composed, "tournament": composed, "resume": resume, "inspect": inspect, "list": listing}[word](
-        word, words
-    )
+    commands = {"train": composed, "tournament": composed, "resume": resume, "inspect": inspect, "list": listing}
+    commands[word](word, words)
 
 
 def composed(word: str, words: list[str]) -> None:
@@ -81,7 +80,7 @@ def composed(word: str, words: list[str]) -> None:
     prepare()
     given = arguments(words)
     if not (given.help or given.hydra_help or given.shell_completion):
-        check(word, words)
+        check(word, words, lambda config: None if given.cfg or given.info else verify(word, config))
     sys.argv = [f"berteam {word}", *words]
     task = {"train": train_task, "tournament": tournament_task}[word]
     try:
@@ -90,6 +89,18 @@ def composed(word: str, words: list[str]) -> None:
         logging.getLogger("berteam").handlers = []
     if given.multirun and Sweeps.failed:
         raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
+
+
+def verify(word: str, config: Any) -> None:
+    """Checks that the parts of a config go together.
+
+    Raises:
+        InputError: they do not.
+    """
+    from berteam_cli import build  # noqa: PLC0415
+    from berteam_cli.command.tournament import players  # noqa: PLC0415
+
+    {"train": build.parts, "tournament": players}[word](config)
 
 
 class Sweeps:

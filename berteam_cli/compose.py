@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,12 +43,13 @@ def arguments(words: list[str]) -> Any:
     return parser.parse_args(words)
 
 
-def check(command: str, words: list[str]) -> None:
+def check(command: str, words: list[str], verify: Callable[[Any], object]) -> None:
     """Composes what the command line asks for and checks it, every value of a sweep once.
 
     Args:
         command: name of the primary config.
         words: the command line after the sub-command.
+        verify: raises InputError where parts of a checked config do not go together.
 
     Raises:
         InputError: a choice, a key or a value is wrong.
@@ -64,7 +65,9 @@ def check(command: str, words: list[str]) -> None:
         for override in overrides:
             check_choice(override)
         for job in jobs(overrides, sweep=given.multirun):
-            checked(composed(given.config_name or command, searched, job))
+            config = composed(given.config_name or command, searched, job)
+            check_learner(config, job)
+            verify(checked(config))
 
 
 def parsed(overrides: list[str]) -> list[Override]:
@@ -97,6 +100,22 @@ def jobs(overrides: list[Override], *, sweep: bool) -> Iterator[list[Override]]:
     for k, options in enumerate(values):
         for other in options[1:]:
             yield [*plain, *first[:k], other, *first[k + 1 :]]
+
+
+def check_learner(config: DictConfig, overrides: list[Override]) -> None:
+    """Checks that what is said of ``learner`` has an effect: a population may bring learners of its own.
+
+    Raises:
+        InputError: it has none.
+    """
+    said = [x.key_or_group for x in overrides if x.key_or_group.split(".")[0] == "learner" and "@" not in x.input_line]
+    islands = config.get("population", {}).get("islands", {})
+    if said and not any(OmegaConf.is_interpolation(island, "learner") for island in islands.values()):
+        name = next(iter(islands))
+        raise InputError(
+            f"{said[0]} has no effect: learner.* not used by this population, whose islands bring their own; "
+            f"say population.islands.{name}.learner.KEY=VALUE instead."
+        )
 
 
 def composed(command: str, searched: list[str], overrides: list[Override]) -> DictConfig:

@@ -42,14 +42,8 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> Non
     Raises:
         InputError: the config does not go together, or the folder is not free.
     """
-    if config.on_exists == "resume":
-        raise InputError("on_exists=resume is for training runs; a tournament takes error or overwrite.")
-    games, acting, teams, names = of_run(config) if config.run else of_fixed_policies(config)
+    games, acting, teams, names = players(config)
     pairs = len(teams) * (len(teams) - 1) // 2
-    if pairs * config.games_per_pair > MOST_GAMES:
-        raise InputError(
-            f"{len(teams)} teams would play {pairs * config.games_per_pair:,} games; at most {MOST_GAMES:,}."
-        )
     folder = folder or new_folder("tournament")
     claim(folder, config.on_exists)
     (folder / CONFIG).write_text(text, encoding="utf-8")
@@ -65,22 +59,42 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> Non
     show(folder, 10)
 
 
-def of_fixed_policies(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
-    """Returns the game, how its fixed policies act, all their teams, and their names.
+def players(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
+    """Returns the game, how its players act, the teams that meet, (K, T), and the players' names.
 
     Raises:
-        InputError: there are too many teams.
+        InputError: the config does not go together, or there is no such run.
+    """
+    if config.on_exists == "resume":
+        raise InputError("on_exists=resume is for training runs; a tournament takes error or overwrite.")
+    return of_run(config) if config.run else of_fixed_policies(config)
+
+
+def of_fixed_policies(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
+    """Returns the same for all teams of the fixed policies.
+
+    Raises:
+        InputError: they are too many.
     """
     games = build.games(config)
     names = games.env.fixed_policies
-    count = team_count(len(names), config.team_size)
-    if count * (count - 1) // 2 * config.games_per_pair > MOST_GAMES:
-        raise InputError(f"team_size={config.team_size} gives {count:,} teams, too many for every pair to play.")
+    check_size(team_count(len(names), config.team_size), f"team_size={config.team_size}", config)
     return games, fixed_policies(range(len(names))), unordered_teams(len(names), config.team_size), list(names)
 
 
+def check_size(teams: int, said: str, config: TournamentConfig) -> None:
+    """Checks that every pair of ``teams`` teams can play.
+
+    Raises:
+        InputError: their games are more than MOST_GAMES; ``said`` is the setting that made them so many.
+    """
+    games = teams * (teams - 1) // 2 * config.games_per_pair
+    if games > MOST_GAMES:
+        raise InputError(f"{said} gives {teams:,} teams and {games:,} games; at most {MOST_GAMES:,} games are played.")
+
+
 def of_run(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
-    """Returns the game of a trained run, how its members act, its most probable teams, and the members' names.
+    """Returns the same for the most probable teams of a trained run.
 
     Raises:
         InputError: there is no such run.
@@ -93,6 +107,7 @@ def of_run(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
     run = checkpoint.load(folder, parts).run
     acting = policies(parts.optimizer.islands, run.population, explore=False)
     found = measured(parts.selector, run.selection, SAMPLES, generator(parts.seed, RECORDS, run.epoch))
+    check_size(min(config.top, len(found.teams)), f"top={config.top}", config)
     top = np.sort(np.argsort(-found.probability, kind="stable")[: config.top])
     return parts.games, acting, found.teams[top], [name for i in parts.optimizer.islands for name in i.names]
 

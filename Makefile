@@ -1,0 +1,43 @@
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/ready
+
+.PHONY: help setup demo test lint bench check picture reference clean
+
+help: ## what can be made
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+
+setup: $(READY) ## a virtual environment with the package and its tests' needs
+
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; assert (3, 11) <= sys.version_info < (3, 14), "Python 3.11 to 3.13 is needed; name one: make PYTHON=python3.12 ..."'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --upgrade pip
+	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $(READY)
+
+demo: setup ## the main job, small: train, then look at what came of it
+	$(BIN)/berteam train experiment=quickstart selector=mcaa optimizer=mapelites
+
+test: setup ## all tests
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/python -m pytest --numprocesses 2
+
+bench: setup ## speed: figures, targets and ratios
+	$(BIN)/python -m tests.bench
+
+check: setup ## replays the recorded games
+	$(BIN)/python -m mctf.check tests/traces/*.npz
+
+picture: setup ## the picture of the README, from a run of the paper's first experiment
+	$(BIN)/berteam train experiment=paper_fixed epochs=600 out=outputs/picture on_exists=overwrite
+	$(BIN)/python docs/picture.py outputs/picture docs/picture.png
+
+reference: setup ## the Elos of the fixed teams that the package ships
+	$(BIN)/python -m berteam_cli.evaluation.reference
+
+clean: ## removes the environment and what tests leave; run folders stay
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .hypothesis .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +

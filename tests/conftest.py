@@ -1,0 +1,14 @@
+"""What all tests share."""
+
+import pytest
+import torch
+from hypothesis import HealthCheck, settings
+
+# A kernel's first call compiles for longer than hypothesis allows an example by default.
+settings.register_profile("kernels", deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=50)
+settings.load_profile("kernels")
+
+
+@pytest.fixture(autouse=True)
+def one_torch_thread():
+    torch.set_num_threads(1)
