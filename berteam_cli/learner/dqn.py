@@ -1,0 +1,161 @@
+"""Deep Q-learning as in Stable-Baselines3, for the members of an island."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import torch
+from numpy.random import Generator
+
+from berteam_cli.acting import GREEDY, Policies, networks
+from berteam_cli.learner.adam import Adam, Trained, untrained
+from berteam_cli.learner.base import Learning
+from berteam_cli.learner.mlp import Singles, layers, uniform
+from berteam_cli.learner.replay import Replay, empty, remember
+from berteam_cli.learner.temporal import learn_steps, schedule
+from berteam_cli.learner.trajectories import by_member
+from berteam_cli.outcomes import Experience, Floats, Ints
+from berteam_cli.workers import Workers
+
+ADAM_EPSILON = 1e-8  # torch's, which Stable-Baselines3 leaves for DQN
+
+
+class DqnState(NamedTuple):
+    """What an island of DQN members knows.
+
+    Attributes:
+        trained: weights of the Q networks and Adam's moments.
+        target: (M, W) float32, weights of the target networks.
+        replay: (M, buffer_size) steps.
+        collected: (M,) steps each member has made in all; exploration, target and buffer follow from it.
+    """
+
+    trained: Trained
+    target: Singles
+    replay: Replay
+    collected: Ints
+
+
+@dataclass(frozen=True)
+class Dqn:
+    """Settings of DQN.
+
+    Attributes:
+        observation_size: O.
+        actions: A.
+        network: widths of the hidden layers.
+        learning_rate: Adam's.
+        buffer_size: steps a member remembers.
+        batch_size: steps of one gradient step.
+        gamma: discount of one step.
+        train_freq: steps of the game from one learning to the next.
+        gradient_steps: gradient steps of each learning.
+        learning_starts: steps a member makes before it learns.
+        target_update_interval: steps of the game until the target network is renewed.
+        exploration_initial: chance of a random action before the first step.
+        exploration_final: chance of a random action at the end of the schedule, and later.
+        exploration_steps: steps over which it falls in a straight line.
+        max_grad_norm: a member's gradient is shortened to this norm.
+    """
+
+    observation_size: int
+    actions: int
+    network: tuple[int, ...]
+    learning_rate: float
+    buffer_size: int
+    batch_size: int
+    gamma: float
+    train_freq: int
+    gradient_steps: int
+    learning_starts: int
+    target_update_interval: int
+    exploration_initial: float
+    exploration_final: float
+    exploration_steps: int
+    max_grad_norm: float
+
+    algorithm: ClassVar[str] = "dqn"
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Widths of the network's layers."""
+        return (self.observation_size, *self.network, self.actions)
+
+    def init(self, members: int, rng: Generator) -> DqnState:
+        """Returns the state of ``members`` members that have not learnt yet."""
+        weights = uniform(self.sizes, members, rng)
+        replay = empty(members, self.buffer_size, self.observation_size)
+        return DqnState(untrained(weights), weights.copy(), replay, np.zeros(members, dtype=np.int64))
+
+    def epsilon(self, collected: Ints) -> Floats:
+        """Returns the chance of a random action after ``collected`` steps."""
+        progress = np.minimum(collected / self.exploration_steps, 1.0)
+        return self.exploration_initial + progress * (self.exploration_final - self.exploration_initial)
+
+    def policies(self, state: DqnState, *, explore: bool) -> Policies:
+        """Returns the members' greedy policies, which err at random as their schedules say if they ``explore``."""
+        chance = self.epsilon(state.collected) if explore else 0.0
+        return networks(GREEDY, layers(state.trained.weights, self.sizes), tanh=False, epsilon=chance)
+
+    def learn(
+        self, state: DqnState, experience: Experience, first: int, rng: Generator, workers: Workers
+    ) -> list[Learning]:
+        """Adds the members' steps to their replay buffers, then takes the gradient steps these allow.
+
+        Changes ``state``.
+        """
+        rngs = rng.spawn(len(state.collected))
+        trajectories = by_member(experience, first, len(state.collected))
+
+        def learn_alone(row: int) -> Learning:
+            before = int(state.collected[row])
+            for game, player in trajectories[row]:
+                state.collected[row] = remember(
+                    state.replay.member(row), int(state.collected[row]), experience, game, player
+                )
+            return self.member_learns(state, row, before, rngs[row])
+
+        return workers.map(learn_alone, list(trajectories))
+
+    def member_learns(self, state: DqnState, row: int, before: int, rng: Generator) -> Learning:
+        """Takes the gradient steps for the steps a member has made since it had made ``before``."""
+        after = int(state.collected[row])
+        count, renewals = schedule(
+            before, after, self.train_freq, self.gradient_steps, self.learning_starts, self.target_update_interval
+        )
+        loss, q_value = learn_steps(
+            Adam(self.learning_rate, ADAM_EPSILON, self.max_grad_norm),
+            state.trained.member(row),
+            state.target[row],
+            np.array(self.sizes),
+            state.replay.member(row),
+            rng.integers(0, min(after, self.buffer_size), (count, self.batch_size)),
+            renewals,
+            self.gamma,
+        )
+        figures = {"loss": float(loss), "q_value": float(q_value)} if count else {}
+        epsilon = float(self.epsilon(state.collected[row]))
+        return Learning(row, updates=count, epsilon=epsilon, steps=after - before, **figures)
+
+    def copy(self, state: DqnState, child: int, parent: int) -> None:
+        """Makes ``child`` a copy of ``parent``, with all that it remembers."""
+        for column in (*state.trained, state.target, *state.replay, state.collected):
+            column[child] = column[parent]
+
+    def tensors(self, state: DqnState) -> dict[str, Any]:
+        """Returns all that ``state`` holds, by name."""
+        columns = {**state.trained._asdict(), "target": state.target, **state.replay._asdict()}
+        columns["collected"] = state.collected
+        return {name: torch.from_numpy(column) for name, column in columns.items()}
+
+    def restored(self, tensors: dict[str, Any]) -> DqnState:
+        """Returns the state that ``tensors`` gave these."""
+        columns = {name: tensor.numpy().copy() for name, tensor in tensors.items()}
+        return DqnState(
+            Trained(*(columns[name] for name in Trained._fields)),
+            columns["target"],
+            Replay(*(columns[name] for name in Replay._fields)),
+            columns["collected"],
+        )

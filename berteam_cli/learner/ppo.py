@@ -1,0 +1,182 @@
+"""Proximal policy optimisation as in Stable-Baselines3, for the members of an island."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+import torch
+from numpy.random import Generator
+
+from berteam_cli.acting import SAMPLED, Policies, networks
+from berteam_cli.learner.adam import Adam, Trained, untrained
+from berteam_cli.learner.base import Learning
+from berteam_cli.learner.mlp import Singles, forward, layers, n_values, orthogonal, weight_count
+from berteam_cli.learner.rollout import Steps, advantages, append, empty, seen, stitched
+from berteam_cli.learner.surrogate import FIGURES, Sample, Surrogate, log_chances, one_update
+from berteam_cli.learner.trajectories import by_member
+from berteam_cli.outcomes import Experience, Ints
+from berteam_cli.workers import Workers
+
+ADAM_EPSILON = 1e-5  # Stable-Baselines3's for actor-critic policies; torch's own is 1e-8
+
+
+class PpoState(NamedTuple):
+    """What an island of PPO members knows.
+
+    Attributes:
+        trained: weights, of the policy network before those of the value network, and Adam's moments.
+        rollouts: (M, n_steps) steps made with these weights, not learnt from yet.
+        filled: (M,) how many steps of each rollout there are.
+    """
+
+    trained: Trained
+    rollouts: Steps
+    filled: Ints
+
+
+@dataclass(frozen=True)
+class Ppo:
+    """Settings of PPO.
+
+    Attributes:
+        observation_size: O.
+        actions: A.
+        network: widths of the hidden layers of the policy and, apart from it, of the value network.
+        learning_rate: Adam's.
+        n_steps: steps a member gathers, over games and epochs, before it learns from them.
+        minibatch_size: steps of one gradient step.
+        n_epochs: how often each step is used.
+        gamma: discount of one step.
+        gae_lambda: in [0, 1], how far advantages look ahead.
+        clip_range: how far an action's probability may move, as a share of what it was.
+        entropy_coef: weight of the entropy in the loss.
+        value_coef: weight of the value network's squared error in the loss.
+        max_grad_norm: a member's gradient is shortened to this norm.
+        normalize_advantage: whether the advantages of a minibatch get mean 0 and standard deviation 1.
+    """
+
+    observation_size: int
+    actions: int
+    network: tuple[int, ...]
+    learning_rate: float
+    n_steps: int
+    minibatch_size: int
+    n_epochs: int
+    gamma: float
+    gae_lambda: float
+    clip_range: float
+    entropy_coef: float
+    value_coef: float
+    max_grad_norm: float
+    normalize_advantage: bool
+
+    algorithm: ClassVar[str] = "ppo"
+
+    @property
+    def policy_sizes(self) -> tuple[int, ...]:
+        """Widths of the policy network's layers."""
+        return (self.observation_size, *self.network, self.actions)
+
+    @property
+    def value_sizes(self) -> tuple[int, ...]:
+        """Widths of the value network's layers."""
+        return (self.observation_size, *self.network, 1)
+
+    def init(self, members: int, rng: Generator) -> PpoState:
+        """Returns the state of ``members`` members that have not learnt yet."""
+        policy = orthogonal(self.policy_sizes, 0.01, members, rng)  # nearly uniform over the actions
+        value = orthogonal(self.value_sizes, 1.0, members, rng)
+        return PpoState(
+            untrained(np.concatenate([policy, value], axis=1)),
+            empty(members, self.n_steps, self.observation_size),
+            np.zeros(members, dtype=np.int64),
+        )
+
+    def policies(self, state: PpoState, *, explore: bool) -> Policies:
+        """Returns the members' stochastic policies; they are evaluated as they play, whatever ``explore`` is."""
+        return networks(SAMPLED, layers(state.trained.weights, self.policy_sizes), tanh=True)
+
+    def learn(
+        self, state: PpoState, experience: Experience, first: int, rng: Generator, workers: Workers
+    ) -> list[Learning]:
+        """Adds the members' steps to their rollouts; whoever's is full learns from it and begins a new one.
+
+        Values and probabilities are those of the weights the games were played with, even of the steps that are
+        left over when a member learns. Changes ``state``.
+        """
+        rngs = rng.spawn(len(state.filled))
+        trajectories = by_member(experience, first, len(state.filled))
+
+        def learn_alone(row: int) -> Learning:
+            return self.member_learns(state, row, self.judged(state, row, experience, trajectories[row]), rngs[row])
+
+        return workers.map(learn_alone, list(trajectories))
+
+    def judged(self, state: PpoState, row: int, experience: Experience, trajectories: list[tuple[int, int]]) -> Steps:
+        """Returns one member's new steps, with what its networks say of them before it learns."""
+        what = seen(experience, trajectories)
+        weights, count = state.trained.weights[row], weight_count(np.array(self.policy_sizes))
+        logits = outputs(weights[:count], self.policy_sizes, what.observations)
+        values = outputs(weights[count:], self.value_sizes, what.observations)
+        return stitched(what, values[:, 0], log_chances(logits, what.actions), self.gamma)
+
+    def member_learns(self, state: PpoState, row: int, new: Steps, rng: Generator) -> Learning:
+        """Adds ``new`` steps to a member's rollout and updates it as often as that is full."""
+        figures: list[Singles] = []
+        used = append(state.rollouts, state.filled, row, new, 0)
+        while state.filled[row] == self.n_steps:
+            figures.append(self.update(state, row, rng))
+            state.filled[row] = 0
+            used += append(state.rollouts, state.filled, row, new, used)
+        if not figures:
+            return Learning(row, steps=used)
+        means = dict(zip(FIGURES, np.mean(figures, axis=0).tolist(), strict=True))
+        minibatches = -(-self.n_steps // self.minibatch_size)
+        return Learning(row, updates=len(figures) * self.n_epochs * minibatches, steps=used, **means)
+
+    def update(self, state: PpoState, row: int, rng: Generator) -> Singles:
+        """Lets a member learn from its full rollout; returns (len(FIGURES),) figures."""
+        rollout = Steps(*(column[row] for column in state.rollouts))
+        gains = advantages(
+            rollout.rewards, rollout.values, rollout.next_values, rollout.ends, self.gamma, self.gae_lambda
+        )
+        return one_update(
+            Surrogate(self.clip_range, self.entropy_coef, self.value_coef, self.normalize_advantage),
+            Adam(self.learning_rate, ADAM_EPSILON, self.max_grad_norm),
+            state.trained.member(row),
+            np.array(self.policy_sizes),
+            np.array(self.value_sizes),
+            Sample(rollout.observations, rollout.actions, rollout.log_probs, gains, gains + rollout.values),
+            np.stack([rng.permutation(self.n_steps) for _ in range(self.n_epochs)]),
+            self.minibatch_size,
+        )
+
+    def copy(self, state: PpoState, child: int, parent: int) -> None:
+        """Makes ``child`` a copy of ``parent`` with an empty rollout, since the parent's steps are not its own."""
+        for column in state.trained:
+            column[child] = column[parent]
+        for column in (*state.rollouts, state.filled):
+            column[child] = 0
+
+    def tensors(self, state: PpoState) -> dict[str, Any]:
+        """Returns all that ``state`` holds, by name."""
+        columns = {**state.trained._asdict(), **state.rollouts._asdict(), "filled": state.filled}
+        return {name: torch.from_numpy(column) for name, column in columns.items()}
+
+    def restored(self, tensors: dict[str, Any]) -> PpoState:
+        """Returns the state that ``tensors`` gave these."""
+        columns = {name: tensor.numpy().copy() for name, tensor in tensors.items()}
+        return PpoState(
+            Trained(*(columns[name] for name in Trained._fields)),
+            Steps(*(columns[name] for name in Steps._fields)),
+            columns["filled"],
+        )
+
+
+def outputs(weights: Singles, sizes: tuple[int, ...], observations: Singles) -> Singles:
+    """Returns the outputs (n, out) of one tanh network for ``observations``, shape (n, O)."""
+    widths = np.array(sizes)
+    values = np.empty(n_values(widths, len(observations)), dtype=np.float32)
+    return forward(weights, widths, True, observations, values)

@@ -1,0 +1,71 @@
+"""The steps a DQN member remembers: a ring for each member of an island."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from berteam_cli.learner.mlp import Singles
+from berteam_cli.outcomes import Bools, Experience
+
+
+class Replay(NamedTuple):
+    """Steps of an island's members, or of one of them without the first axis, R in each ring.
+
+    Step number t of a member, counted from its first, lies at t modulo R.
+
+    Attributes:
+        observations: (M, R, O) float32, seen before the step.
+        next_observations: (M, R, O) float32, seen after it.
+        actions: (M, R) int16.
+        rewards: (M, R) float32.
+        terminated: (M, R) bool, whether the rules ended the game with the step; when time runs out they do not.
+    """
+
+    observations: Singles
+    next_observations: Singles
+    actions: npt.NDArray[np.int16]
+    rewards: Singles
+    terminated: Bools
+
+    def member(self, row: int) -> Replay:
+        """Returns views of one member's ring."""
+        return Replay(*(column[row] for column in self))
+
+
+def empty(members: int, length: int, observation_size: int) -> Replay:
+    """Returns rings of ``length`` steps; the memory is taken as they fill."""
+    shape = (members, length)
+    return Replay(
+        observations=np.zeros((*shape, observation_size), dtype=np.float32),
+        next_observations=np.zeros((*shape, observation_size), dtype=np.float32),
+        actions=np.zeros(shape, dtype=np.int16),
+        rewards=np.zeros(shape, dtype=np.float32),
+        terminated=np.zeros(shape, dtype=np.bool_),
+    )
+
+
+def remember(ring: Replay, collected: int, experience: Experience, game: int, player: int) -> int:
+    """Writes one trajectory over a member's oldest steps.
+
+    Args:
+        ring: of one member. Changed.
+        collected: how many steps the member made before.
+        experience: all games.
+        game: the game.
+        player: its player.
+
+    Returns:
+        How many steps the member has made now.
+    """
+    room, length = len(ring.actions), int(experience.lengths[game])
+    steps = np.arange(max(0, length - room), length)  # of more than fit, the last ones stay
+    at = (collected + steps) % room
+    ring.observations[at] = experience.observations[game, player, steps]
+    ring.next_observations[at] = experience.observations[game, player, steps + 1]
+    ring.actions[at] = experience.actions[game, player, steps]
+    ring.rewards[at] = experience.rewards[game, player, steps]
+    ring.terminated[at] = experience.terminated[game] & (steps == length - 1)
+    return collected + length
