@@ -63,7 +63,7 @@ def parts(config: TrainConfig) -> Parts:
     """
     playing = games(config)
     device = chosen_device(config.device)
-    islands = archipelago(config, playing.env, device)
+    islands = archipelago(config, playing.env)
     members = sum(island.size for island in islands)
     if config.team_size > members:
         raise InputError(
@@ -91,7 +91,7 @@ def chosen_device(name: str) -> str:
     return "cuda" if there and name != "cpu" else "cpu"
 
 
-def archipelago(config: TrainConfig, game: Env, device: str) -> tuple[Island, ...]:
+def archipelago(config: TrainConfig, game: Env) -> tuple[Island, ...]:
     """Returns the islands of the population, one after the other.
 
     Raises:
@@ -104,7 +104,7 @@ def archipelago(config: TrainConfig, game: Env, device: str) -> tuple[Island, ..
         if settings.learner.name == "fixed":
             made, names = fixed_members(settings, game, key)
         else:
-            made, names = learner(settings.learner, game, device, key), [f"{name}.{m}" for m in range(settings.size)]
+            made, names = learner(settings.learner, game, key), [f"{name}.{m}" for m in range(settings.size)]
         islands.append(Island(name, first, settings.size, made, tuple(names)))
     if not islands:
         raise InputError("population.islands must have at least one island, but has none.")
@@ -137,7 +137,7 @@ def check_policies(names: list[str], game: Env, key: str) -> None:
             raise InputError.choice(f"{key} (with env={game.name})", name, game.fixed_policies)
 
 
-def learner(config: LearnerConfig, game: Env, device: str, key: str) -> Learner[Any]:
+def learner(config: LearnerConfig, game: Env, key: str) -> Learner[Any]:
     """Returns a learner of networks.
 
     Raises:
@@ -152,7 +152,6 @@ def learner(config: LearnerConfig, game: Env, device: str, key: str) -> Learner[
         observation_size=game.observation_size,
         actions=game.actions,
         network=tuple(network),
-        device=device,
         **settings,
     )
 

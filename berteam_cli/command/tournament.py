@@ -16,6 +16,7 @@ from berteam_cli.command.inspect import show
 from berteam_cli.command.resume import stored_config
 from berteam_cli.config import TournamentConfig, checked
 from berteam_cli.errors import InputError
+from berteam_cli.evaluation.reference import table_name
 from berteam_cli.evaluation.tournament import Standings, tournament
 from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder, read_manifest
 from berteam_cli.games import Games
@@ -28,7 +29,7 @@ from berteam_cli.training import RECORDS, generator
 
 log = logging.getLogger("berteam")
 
-MOST_GAMES = 10_000_000
+MOST_GAMES = 1_000_000  # some hours
 
 
 def play(config: TournamentConfig, text: str, folder: Path | None = None) -> None:
@@ -49,7 +50,8 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> Non
     (folder / CONFIG).write_text(text, encoding="utf-8")
     with logging_to(folder):
         log.info("%s", folder)
-        manifest = Manifest(folder, seed=config.seed, teams=len(teams), pairs=pairs)
+        facts = {} if config.run else {"reference": table_name(games.env)}
+        manifest = Manifest(folder, seed=config.seed, teams=len(teams), pairs=pairs, **facts)
         log.info("%d teams, %d pairs, %d games each.", len(teams), pairs, config.games_per_pair)
         standings = tournament(games, acting, teams, config.games_per_pair, config.seed)
         write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, names))

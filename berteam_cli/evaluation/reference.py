@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from berteam_cli.acting import fixed_policies
+from berteam_cli.env.base import Env
 from berteam_cli.evaluation.tournament import tournament
 from berteam_cli.games import Games
 from berteam_cli.outcomes import Floats, Ints
@@ -38,10 +39,10 @@ class Reference:
     source: str
 
 
-def fingerprint(games: Games) -> str:
-    """Returns eight hexadecimal digits that tell the game's settings from others."""
-    said = json.dumps(games.env.fingerprint(), sort_keys=True)
-    return hashlib.sha256(said.encode()).hexdigest()[:8]
+def table_name(env: Env) -> str:
+    """Returns the name of the shipped table for a game: with eight digits that tell its settings from others."""
+    said = json.dumps(env.fingerprint(), sort_keys=True)
+    return f"{env.name}_{env.team_size}_{hashlib.sha256(said.encode()).hexdigest()[:8]}.csv"
 
 
 def reference_teams(policies: int, team_size: int, most: int) -> Ints:
@@ -63,7 +64,7 @@ def reference(games: Games, most: int) -> Reference:
     """
     env = games.env
     teams = reference_teams(len(env.fixed_policies), env.team_size, most)
-    name = f"{env.name}_{env.team_size}_{fingerprint(games)}.csv"
+    name = table_name(env)
     shipped = importlib.resources.files("berteam_cli.rating").joinpath(name)
     if shipped.is_file():
         with shipped.open(encoding="utf-8") as file:

@@ -1,0 +1,81 @@
+"""Wrong input: one sentence with what is right, exit code 2, nothing left behind."""
+
+import re
+import sys
+
+import pytest
+
+from berteam_cli import cli
+
+CASES = {
+    ("trian",): "'trian' is no command.*Did you mean train",
+    ("train", "selector=mcca"): "selector must be one of berteam, mcaa, uniform, but is 'mcca'.*Did you mean mcaa",
+    ("train", "population=ppo5"): "population must be one of .*Did you mean ppo50",
+    ("train", "-m", "selector=mcaa,berteem"): "'berteem'.*Did you mean berteam",
+    ("train", "selecter=mcaa"): "selecter is no key.*Did you mean selector",
+    ("train", "optimizer.protect=3"): r"optimizer.protect is no key.*optimizer.protect_new",
+    ("train", "selector=mcaa", "selector.captain=uniform"): "selector.captain is no key",
+    ("train", "epochs=-1"): "epochs must be >= 0, but is -1",
+    ("train", "-m", "epochs=1,2,-3"): "epochs must be >= 0, but is -3",
+    ("train", "epochs=many"): "epochs.*'many'",
+    ("train", "epochs="): "epochs",
+    ("train", "seed=nan"): "seed.*nan",
+    ("train", "seed=-1"): "seed must be >= 0",
+    ("train", "env.max_time_s=nan"): "env.max_time_s must be > 0",
+    ("train", "env.max_time_s=inf"): "env.max_time_s must be > 0",
+    ("train", "env.catch_radius_m=0"): "env.catch_radius_m must be > 0, but is 0",
+    ("train", "env.world_size_m=[10,10]"): r"env.world_size_m.*but is 10",
+    ("train", "env.reward=gold"): "env.reward must be one of custom_rew, custom_rew2, sparse, but is 'gold'",
+    ("train", "games_per_epoch=0"): "games_per_epoch must be >= 1",
+    ("train", "selector.dropout=2"): "selector.dropout must be >= 0 and <= 0.99",
+    ("train", "population=fixed_policies", "team_size=8"): "team_size must be at most 7",
+    ("train", "population.islands.ppo64.size=0"): "population.islands.ppo64.size must be >= 1",
+    ("train", "population.islands.ppo64.size=-2"): "population.islands.ppo64.size must be >= 1",
+    ("train", "population=fixed_policies", "population.islands.random.size=2"): "islands.random.size must be 1",
+    ("train", "population=ppo6", "learner.network=[]"): "learner.network must be 1 to 6 widths",
+    ("train", "learner.network=[8]"): "learner.* not used",
+    ("train", "env=rps", "population=fixed_policies"): "policies.*env=rps.*rock",
+    ("train", "env=rps", "population=ppo6", "optimizer=mapelites"): "optimizer.opponents.*rock",
+    ("train", "selector=mcaa", "optimizer.fitness=elo"): "selector=mcaa has none",
+    ("train", "selector.heads=3"): "selector.*heads",
+    ("train", "selector.minibatch_size=1000"): "selector.minibatch_size",
+    ("train", "device=tpu"): "device must be one of auto, cpu, cuda",
+    ("train", "out=/proc/none/here"): "out=/proc/none/here cannot be written",
+    ("train", "-m", "out=x", "seed=0,1"): "out is one folder",
+    ("train", "seed=0,1"): "seed.*multirun",
+    ("train", "--frobnicate"): "--frobnicate",
+    ("train", "epochs"): "'epochs' cannot be read as key=value",
+    ("train", "épochs=3"): "pochs",
+    ("train", "--config-dir", "nowhere"): "--config-dir must be a folder",
+    ("tournament", "team_size=6"): "team_size=6 gives",
+    ("tournament", "games_per_pair=0"): "games_per_pair must be >= 1",
+    ("tournament", "run=nowhere"): "nowhere is no folder of a run",
+    ("tournament", "on_exists=resume"): "on_exists=resume is for training",
+    ("inspect", "nowhere"): "nowhere is no folder of a run",
+    ("inspect",): "required: run",
+    ("inspect", ".", "--top", "0"): "--top must be >= 1",
+    ("resume", "nowhere"): "nowhere is no folder of a run",
+    ("list", "selecter"): "group must be one of .*Did you mean selector",
+}
+
+
+@pytest.mark.parametrize(("words", "said"), CASES.items(), ids=" ".join)
+def test_wrong_input(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["berteam", *words])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    error = capsys.readouterr().err
+    assert stopped.value.code == cli.WRONG, error
+    assert re.search(said, error), error
+    assert error.count("\n") == 1, error
+    assert error.startswith("berteam: ")
+    assert "Traceback" not in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_as_a_process(berteam, tmp_path):
+    done = berteam("train", "selector=mcca", code=2)
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []

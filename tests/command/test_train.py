@@ -1,0 +1,212 @@
+"""The main job, for real: every selector with every optimizer, and the tables they leave."""
+
+import json
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from berteam_cli.records import COLUMNS, GROWING
+from tests.command.conftest import BERTEAM, SMALL_BERTEAM, TINY
+
+TABLES = ("elo", "summary", *GROWING)
+UNTIMED = [name for name in TABLES if name not in {"timing", "summary"}]
+
+
+def read(folder, name):
+    return pd.read_csv(folder / f"{name}.csv", dtype={"team": str, "blue": str, "red": str, "best_team": str})
+
+
+def selector_words(selector):
+    return [f"selector={selector}", *(SMALL_BERTEAM if selector == "berteam" else [])]
+
+
+def check_tables(folder, members, epochs=4, games=4):
+    """Asserts that every table is there with its columns and says what must be true of any run."""
+    tables = {name: read(folder, name) for name in TABLES}
+    for name, table in tables.items():
+        assert tuple(table.columns) == COLUMNS[name]
+        assert b"\r" not in (folder / f"{name}.csv").read_bytes()
+    recorded = [0, 2, 4]
+    teams = members * (members + 1) // 2
+    for name, rows in (("team_distribution", teams), ("captain_distribution", members)):
+        assert list(tables[name].epoch.unique()) == recorded
+        np.testing.assert_allclose(tables[name].groupby("epoch").probability.sum(), 1, atol=1e-9)
+        assert len(tables[name]) == rows * len(recorded)
+    np.testing.assert_allclose(tables["island_distribution"].groupby("epoch").probability.sum(), 1, atol=1e-9)
+    played = tables["games"]
+    assert len(played) == epochs * games
+    assert ((played.blue_score + played.red_score) == 1).all()
+    assert ((played.blue_score > played.red_score) == (played.blue_captures > played.red_captures)).all()
+    assert played.seed.is_unique
+    agents = tables["agents"]
+    assert len(agents) == members * len(recorded)
+    assert list(tables["timing"].epoch) == list(range(1, epochs + 1)) == list(tables["selector"].epoch)
+    elo = tables["elo"]
+    assert (elo.elo_low < elo.elo).all()
+    assert (elo.elo < elo.elo_high).all()
+    assert elo.elo.is_monotonic_decreasing
+    assert ((elo.wins + elo.draws + elo.losses) == elo.games).all()
+    assert list(elo["rank"]) == list(range(1, len(elo) + 1))
+    last = tables["team_distribution"].query("epoch == 4").set_index("team").probability
+    np.testing.assert_array_equal(elo.set_index("team").probability, last[elo.team])
+    summary = tables["summary"].iloc[0]
+    assert summary.best_team == elo.team[0]
+    assert summary.games == epochs * games
+    assert summary.env_steps == tables["timing"].env_steps.sum() >= played.steps.sum()
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert manifest["status"] == "done"
+    assert manifest["evaluation"]["rated"] == len(elo)
+    return tables
+
+
+@pytest.mark.parametrize("optimizer", ["coevolution", "mapelites"])
+@pytest.mark.parametrize("selector", ["berteam", "mcaa", "uniform"])
+def test_every_selector_with_every_optimizer(selector, optimizer, berteam, tmp_path):
+    words = [*TINY, *selector_words(selector), f"optimizer={optimizer}", "population=islands4x3", "out=run"]
+    learner = "population.islands.{}.learner.n_steps=64"
+    words += [learner.format(name) for name in ("ppo64", "ppo96")] + ["optimizer.protect_new=0"]
+    words += ["evaluation.games=448"]  # 8 of the 78 teams
+    done = berteam("train", *words)
+    assert done.stdout.splitlines()[0] == "run"
+    tables = check_tables(tmp_path / "run", 12)
+    assert len(tables["elo"]) == 8
+    assert (tables["learning"].updates > 0).any()
+    assert len(tables["generations"]) > 0
+    assert set(tables["learning"].algorithm) == {"ppo", "dqn"}
+    captains = tables["games"].blue_captain
+    assert (captains == -1).all() if selector == "mcaa" else (captains >= 0).all()
+    assert tables["agents"].aggression.notna().any() == (optimizer == "mapelites")
+
+
+def test_fixed_policies(berteam, tmp_path):
+    words = ["optimizer=fixed", "population=fixed_policies", *TINY, *SMALL_BERTEAM, "out=run"]
+    berteam("train", *words, "evaluation.games=10000")
+    tables = check_tables(tmp_path / "run", 7)
+    assert len(tables["elo"]) == 28
+    assert len(tables["generations"]) == 0
+    assert set(tables["agents"].name) > {"attack_hard", "random"}
+
+
+def test_the_same_seed_gives_the_same_bytes_whatever_the_workers(berteam, tmp_path):
+    words = ["population=islands4x3", *TINY, *SMALL_BERTEAM, "optimizer=mapelites", "optimizer.protect_new=0"]
+    for workers in (1, 2, 3):
+        berteam("train", *words, f"workers={workers}", f"out=w{workers}")
+    for name in UNTIMED:
+        one = (tmp_path / "w1" / f"{name}.csv").read_bytes()
+        assert one == (tmp_path / "w2" / f"{name}.csv").read_bytes(), name
+        assert one == (tmp_path / "w3" / f"{name}.csv").read_bytes(), name
+    berteam("train", *words, "seed=1", "out=other")
+    assert (tmp_path / "other" / "games.csv").read_bytes() != (tmp_path / "w1" / "games.csv").read_bytes()
+
+
+@pytest.mark.parametrize("selector", ["berteam", "mcaa"])
+def test_a_resumed_run_ends_with_the_same_bytes(selector, berteam, tmp_path):
+    words = [*selector_words(selector), "population=islands4x3", *TINY, "optimizer.protect_new=1"]
+    words += [f"population.islands.{name}.learner.n_steps=50" for name in ("ppo64", "ppo96")]
+    berteam("train", *words, "out=whole", "epochs=6")
+    berteam("train", *words, "out=parts", "epochs=3")
+    berteam("resume", "parts", "epochs=6", "workers=1")
+    # The record of epoch 3, which was the last one then, is in the parts alone.
+    for name in UNTIMED:
+        whole, parts = read(tmp_path / "whole", name), read(tmp_path / "parts", name)
+        if name in {"agents", "team_distribution", "captain_distribution", "island_distribution"}:
+            parts = parts[parts.epoch != 3].reset_index(drop=True)
+        if name == "selector":
+            parts.loc[parts.epoch == 3, ["effective_teams", "entropy"]] = np.nan
+        pd.testing.assert_frame_equal(whole, parts, check_exact=True)
+
+
+def test_an_interrupted_run_goes_on(berteam, tmp_path):
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", *SMALL_BERTEAM, "games_per_epoch=4"]
+    words += ["record_every=100"]
+    berteam(*words, "epochs=3000", "out=whole")
+    process = subprocess.Popen(
+        [BERTEAM, *words, "epochs=3000", "out=cut"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+    )
+    table = tmp_path / "cut" / "games.csv"
+    while not (table.exists() and table.stat().st_size > 5000):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "berteam resume cut" in said
+    assert json.loads((tmp_path / "cut" / "manifest.json").read_text())["status"] == "interrupted"
+    berteam("resume", "cut")
+    for name in UNTIMED:
+        assert (tmp_path / "cut" / f"{name}.csv").read_bytes() == (tmp_path / "whole" / f"{name}.csv").read_bytes()
+
+
+def test_on_exists(berteam, tmp_path):
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", *SMALL_BERTEAM, "out=run"]
+    berteam(*words, "epochs=2")
+    (tmp_path / "run" / "notes.txt").write_text("mine")
+    before = {path.name: path.read_bytes() for path in (tmp_path / "run").glob("*.*")}
+    refused = berteam(*words, "epochs=2", code=2)
+    assert "on_exists=overwrite" in refused.stderr
+    assert {path.name: path.read_bytes() for path in (tmp_path / "run").glob("*.*")} == before
+    changed = berteam(*words, "games_per_epoch=5", "epochs=3", "on_exists=resume", code=2)
+    assert "games_per_epoch" in changed.stderr
+    berteam(*words, "epochs=3", "on_exists=resume")
+    assert len(read(tmp_path / "run", "timing")) == 3
+    berteam(*words, "epochs=1", "on_exists=overwrite")
+    assert len(read(tmp_path / "run", "timing")) == 1
+    assert (tmp_path / "run" / "notes.txt").read_text() == "mine"
+
+
+def test_a_failed_run_says_so_and_keeps_its_state(berteam, tmp_path):
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", *SMALL_BERTEAM, "out=run"]
+    berteam(*words, "epochs=2")
+    state = next((tmp_path / "run" / "checkpoint").glob("epoch_*")) / "tensors.safetensors"
+    damaged = bytearray(state.read_bytes())
+    damaged[-1] ^= 1
+    state.write_bytes(damaged)
+    done = berteam("resume", "run", "epochs=3", code=3)
+    assert "checksum" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_sweep(berteam, tmp_path):
+    words = ["-m", "selector=uniform,mcaa", "seed=0,1", "population=islands4x3", "hydra.sweep.dir=sweep"]
+    berteam("train", *words, *TINY, "epochs=2")
+    table = pd.read_csv(tmp_path / "sweep" / "sweep.csv")
+    assert list(table.job) == [0, 1, 2, 3]
+    assert (table.status == "done").all()
+    assert table.overrides[1].startswith("selector=uniform seed=1")
+    assert table.expected_elo.notna().all()
+    for job in range(4):
+        assert (tmp_path / "sweep" / str(job) / "elo.csv").exists()
+
+
+def test_sampled_distribution_says_so(berteam, tmp_path):
+    words = ["env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "epochs=1", "record_teams=4"]
+    berteam("train", *words, "out=run")
+    table = read(tmp_path / "run", "team_distribution")
+    assert list(table[table.epoch == 1].team[-1:]) == ["other"]
+    np.testing.assert_allclose(table.groupby("epoch").probability.sum(), 1)
+    assert len(table[table.epoch == 1]) == 5
+    assert "sampled" in json.loads((tmp_path / "run" / "manifest.json").read_text())["team_distribution"]
+
+
+def test_flags_of_hydra(berteam, tmp_path):
+    assert "learning_rate" in berteam("train", "selector=mcaa", "--cfg", "job").stdout
+    helped = berteam("train", "--help").stdout
+    assert "selector: berteam, mcaa, uniform" in helped
+    assert "berteam train selector=mcaa optimizer=mapelites" in helped
+    assert list(tmp_path.iterdir()) == []
+    assert berteam("--version").stdout.strip()
+    assert "tournament" in berteam("--help").stdout
+
+
+def test_a_folder_of_ones_own_choices(berteam, tmp_path):
+    mine = tmp_path / "mine" / "population"
+    mine.mkdir(parents=True)
+    (mine / "pair.yaml").write_text(
+        "defaults: [/schema/population/islands@_here_, _self_]\nislands: {main: {size: 2, learner: '${learner}'}}\n"
+    )
+    berteam("train", "--config-dir", "mine", "population=pair", "env=rps", "selector=uniform", "epochs=2", "out=run")
+    assert set(read(tmp_path / "run", "agents").agent) == {0, 1}
