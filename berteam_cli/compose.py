@@ -63,7 +63,9 @@ def check(command: str, words: list[str], verify: Callable[[Any], object]) -> No
         if given.multirun and any(x.key_or_group == "out" for x in overrides):
             raise InputError("out is one folder for all runs of a sweep; use hydra.sweep.dir=DIR instead.")
         for override in overrides:
-            check_choice(override)
+            if override.is_sweep_override() and not given.multirun:
+                raise InputError(f"{override.input_line} is a sweep over several values; add --multirun (-m) for one.")
+            check_choice(override, searched)
         for job in jobs(overrides, sweep=given.multirun):
             config = composed(given.config_name or command, searched, job)
             check_learner(config, job)
@@ -141,14 +143,14 @@ def said(error: Exception) -> str:
     return f"{str(error).splitlines()[0].rstrip('.')}."
 
 
-def check_choice(override: Override) -> None:
-    """Checks an override of a config group against the choices there are.
+def check_choice(override: Override, searched: list[str]) -> None:
+    """Checks an override of a config group against the choices there are, those of ``searched`` folders included.
 
     Raises:
         InputError: with the nearest choice.
     """
     group = override.key_or_group
-    allowed = choices(group)
+    allowed = choices(group, searched)
     if not allowed:
         return
     value = override.value()
@@ -159,11 +161,17 @@ def check_choice(override: Override) -> None:
             raise InputError.choice(group, text, allowed)
 
 
-def choices(group: str) -> list[str]:
-    """Returns the choices of a config group, none if there is no such group."""
-    if group.split("/", maxsplit=1)[0] == "schema":
+def choices(group: str, searched: list[str] | None = None) -> list[str]:
+    """Returns the choices of a config group, none if there is no such group.
+
+    Args:
+        group: such as "selector".
+        searched: overrides that add folders to search.
+    """
+    if group.split("/")[0] == "schema":
         return []
-    return sorted(GlobalHydra.instance().config_loader().get_group_options(group))
+    loader = GlobalHydra.instance().config_loader()
+    return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
 
 
 def groups() -> list[str]:
@@ -177,7 +185,7 @@ def check_keys(command: str, searched: list[str], overrides: list[Override]) -> 
     Raises:
         InputError: one is not; with the nearest that is.
     """
-    chosen = [x for x in overrides if choices(x.key_or_group)]
+    chosen = [x for x in overrides if choices(x.key_or_group, searched)]
     try:
         config = compose(command, overrides=[*searched, *(x.input_line or "" for x in chosen)])
     except (HydraException, OmegaConfBaseException):

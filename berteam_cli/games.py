@@ -42,7 +42,7 @@ class Games:
             record: whether anyone will learn; else the experience has no rows.
         """
         games = len(lineups)
-        players = np.ascontiguousarray(lineups.teams.reshape(games, -1))
+        players = np.ascontiguousarray(lineups.teams.reshape(games, 2 * self.env.team_size))
         seeds = seeds_of(key, games)
         results = blank_results(self.env, games, record=record)
         self.workers.map(

@@ -173,11 +173,14 @@ def selector_rows() -> Iterator[Row]:
 
 def start_rows() -> Iterator[Row]:
     berteam = str(Path(sys.executable).with_name("berteam"))
-    quiet = {"stdout": subprocess.DEVNULL, "check": True}
-    yield "berteam --help, s", f"{seconds(lambda: subprocess.run([berteam, '--help'], **quiet)):.2f}", "0.5"
+
+    def quiet(*words: str) -> None:
+        subprocess.run([berteam, *words], stdout=subprocess.DEVNULL, check=True)
+
+    yield "berteam --help, s", f"{seconds(lambda: quiet('--help')):.2f}", "0.5"
     with tempfile.TemporaryDirectory() as folder:
-        words = [berteam, "train", "epochs=0", "evaluation.games=0", f"out={folder}/run", "on_exists=overwrite"]
-        yield "berteam train until the first game, s", f"{seconds(lambda: subprocess.run(words, **quiet), 1):.1f}", "5"
+        words = ["train", "epochs=0", "evaluation.games=0", f"out={folder}/run", "on_exists=overwrite"]
+        yield "berteam train until the first game, s", f"{seconds(lambda: quiet(*words), 1):.1f}", "5"
 
 
 def main() -> None:

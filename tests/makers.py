@@ -1,5 +1,7 @@
 """Small real things for tests."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from berteam_cli.acting import SAMPLED, networks
@@ -22,6 +24,6 @@ def random_networks(members, env, seed=0, hidden=8, scale=1.0):
             (scale * rng.normal(size=(members, a, b))).astype(np.float32),
             np.zeros((members, b), dtype=np.float32),
         )
-        for a, b in zip(widths, widths[1:], strict=False)
+        for a, b in pairwise(widths)
     ]
     return networks(SAMPLED, layers, tanh=True)

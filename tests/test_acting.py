@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import torch
@@ -8,7 +10,7 @@ from berteam_cli.acting import FIXED, GREEDY, SAMPLED, act, drawn, fixed_policie
 
 
 def layers(rng, members, *widths):
-    pairs = list(zip(widths, widths[1:], strict=False))
+    pairs = pairwise(widths)
     return [
         (rng.normal(size=(members, a, b)).astype(np.float32), rng.normal(size=(members, b)).astype(np.float32))
         for a, b in pairs

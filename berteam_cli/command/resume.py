@@ -9,7 +9,7 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from berteam_cli.command.train import train
-from berteam_cli.config import SCHEMAS, TrainConfig, checked, one_line
+from berteam_cli.config import SCHEMAS, IslandConfig, TrainConfig, checked, one_line
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.folder import CONFIG, read_manifest
 
@@ -62,7 +62,8 @@ def stored_config(folder: Path) -> Any:
         typed.population = OmegaConf.structured(SCHEMAS["population"]["islands"])
         typed.population.islands = {}
         for name, island in plain.population.islands.items():
-            typed.population.islands[name] = {"size": island.size, "learner": schema("learner", island.learner.name)}
+            typed.population.islands[name] = OmegaConf.structured(IslandConfig)
+            typed.population.islands[name].learner = OmegaConf.structured(schema("learner", island.learner.name))
         return OmegaConf.merge(typed, plain)
     except (OSError, OmegaConfBaseException, AttributeError, KeyError, TypeError) as error:
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {error}.") from error

@@ -23,7 +23,7 @@ from berteam_cli.checkpoint import Saved
 from berteam_cli.command.inspect import show
 from berteam_cli.config import TrainConfig
 from berteam_cli.errors import RunError
-from berteam_cli.evaluation.reference import Reference, reference
+from berteam_cli.evaluation.reference import Reference, reference, reference_teams
 from berteam_cli.evaluation.truth import Truth, choose_teams, truth
 from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
 from berteam_cli.population import policies
@@ -142,15 +142,21 @@ def evaluated(
     seconds: Any,
 ) -> float:
     """Rates the teams, writes elo.csv and summary.csv, and returns the expected Elo."""
-    settings = config.evaluation
-    games = run.played if settings.games is None else settings.games
-    known = reference(parts.games, settings.reference_teams)
+    settings, game = config.evaluation, parts.games.env
+    opponents = len(reference_teams(len(game.fixed_policies), game.team_size, settings.reference_teams))
+    each = opponents * settings.games_per_pair
+    budget = run.played if settings.games is None else settings.games
     rng = generator(parts.seed, EVALUATION, run.epoch)
     distribution = recorder.distribution(run)
-    chosen = choose_teams(distribution, known, settings.games_per_pair, games, rng)
+    chosen = choose_teams(distribution, each, budget, rng)
     log.info(
-        "Rating %d of %d teams in %s games.", len(chosen[0]), len(distribution.teams), played_in(chosen, known, config)
+        "Rating %d of %d teams, %d games each, as evaluation.games=%s allows.",
+        *(len(chosen[0]), len(distribution.teams), each, f"{budget:,}"),
     )
+    if len(chosen[0]) == 0:
+        known = Reference(np.zeros((0, game.team_size), dtype=np.int64), np.zeros(0), "none: no team was rated")
+    else:
+        known = reference(parts.games, settings.reference_teams)
     members = policies(parts.optimizer.islands, run.population, explore=False)
     rated = truth(parts.games, members, chosen, known, settings.games_per_pair, rng)
     manifest.add(
@@ -172,11 +178,6 @@ def evaluated(
     )
     write_table(folder / "summary.csv", COLUMNS["summary"], [row])
     return expected
-
-
-def played_in(chosen: tuple[Any, ...], known: Reference, config: TrainConfig) -> str:
-    """Returns the number of games that rating the ``chosen`` teams takes, as it is read."""
-    return f"{len(chosen[0]) * len(known.teams) * config.evaluation.games_per_pair:,}"
 
 
 def elo_rows(parts: Parts, rated: Truth) -> Iterator[tuple[Any, ...]]:

@@ -73,14 +73,14 @@ class Truth:
 
 
 def choose_teams(
-    distribution: TeamDistribution, reference: Reference, games_per_pair: int, games: int, rng: Generator
+    distribution: TeamDistribution, games_per_team: int, games: int, rng: Generator
 ) -> tuple[Ints, Floats, np.ndarray]:
     """Returns the teams to rate, their probabilities, and which are there for being probable.
 
     All teams if ``games`` suffice for them; else half of those they suffice for are the most probable ones and the
     others are drawn, each alike, from the rest.
     """
-    afforded = games // (len(reference.teams) * games_per_pair)
+    afforded = games // games_per_team
     everyone = len(distribution.teams)
     by_chance = np.argsort(-distribution.probability, kind="stable")
     if afforded >= everyone:

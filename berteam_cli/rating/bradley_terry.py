@@ -66,8 +66,8 @@ def held_ratings(scores: Floats, games: Floats, anchors: Floats) -> tuple[Floats
     """
     held = nats(np.asarray(anchors, dtype=float))
     made = scores.sum(axis=1) + 0.5 * PRIOR_DRAWS
-    low = np.full(len(scores), held.min() - 40.0)
-    high = np.full(len(scores), held.max() + 40.0)
+    low = np.full(len(scores), held.min(initial=0.0) - 40.0)
+    high = np.full(len(scores), held.max(initial=0.0) + 40.0)
     for _ in range(70):
         middle = 0.5 * (low + high)
         hoped = (games * expected(middle[:, np.newaxis], held)).sum(axis=1) + PRIOR_DRAWS * expected(middle, 0.0)

@@ -121,8 +121,8 @@ def test_a_resumed_run_ends_with_the_same_bytes(selector, berteam, tmp_path):
 
 
 def test_an_interrupted_run_goes_on(berteam, tmp_path):
-    words = ["train", "env=rps", "population=hands", "optimizer=fixed", *SMALL_BERTEAM, "games_per_epoch=4"]
-    words += ["record_every=100"]
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "games_per_epoch=4"]
+    words += ["record_every=100", "checkpoint_every=10000"]
     berteam(*words, "epochs=3000", "out=whole")
     process = subprocess.Popen(
         [BERTEAM, *words, "epochs=3000", "out=cut"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
@@ -142,7 +142,7 @@ def test_an_interrupted_run_goes_on(berteam, tmp_path):
 
 
 def test_on_exists(berteam, tmp_path):
-    words = ["train", "env=rps", "population=hands", "optimizer=fixed", *SMALL_BERTEAM, "out=run"]
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "out=run"]
     berteam(*words, "epochs=2")
     (tmp_path / "run" / "notes.txt").write_text("mine")
     before = {path.name: path.read_bytes() for path in (tmp_path / "run").glob("*.*")}
@@ -159,7 +159,7 @@ def test_on_exists(berteam, tmp_path):
 
 
 def test_a_failed_run_says_so_and_keeps_its_state(berteam, tmp_path):
-    words = ["train", "env=rps", "population=hands", "optimizer=fixed", *SMALL_BERTEAM, "out=run"]
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "out=run"]
     berteam(*words, "epochs=2")
     state = next((tmp_path / "run" / "checkpoint").glob("epoch_*")) / "tensors.safetensors"
     damaged = bytearray(state.read_bytes())
@@ -172,7 +172,7 @@ def test_a_failed_run_says_so_and_keeps_its_state(berteam, tmp_path):
 
 def test_sweep(berteam, tmp_path):
     words = ["-m", "selector=uniform,mcaa", "seed=0,1", "population=islands4x3", "hydra.sweep.dir=sweep"]
-    berteam("train", *words, *TINY, "epochs=2")
+    berteam("train", *words, *TINY, "epochs=2", "evaluation.games=112")
     table = pd.read_csv(tmp_path / "sweep" / "sweep.csv")
     assert list(table.job) == [0, 1, 2, 3]
     assert (table.status == "done").all()
