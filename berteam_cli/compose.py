@@ -168,7 +168,7 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
         group: such as "selector".
         searched: overrides that add folders to search.
     """
-    if group.split("/")[0] == "schema":
+    if group.split("/", maxsplit=1)[0] == "schema":
         return []
     loader = GlobalHydra.instance().config_loader()
     return sorted(loader.get_group_options(group, config_name="train", overrides=searched))

@@ -19,12 +19,12 @@ def draw(run: Path, picture: Path) -> None:
     over_time = teams.pivot_table(index="epoch", columns="team", values="probability")
     top = over_time.iloc[-1].nlargest(TOP).index
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2), width_ratios=(1.2, 1), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.6), width_ratios=(1.2, 1), layout="constrained")
     shares = [over_time[team] for team in top] + [1 - over_time[top].sum(axis=1)]
     colors = [*plt.get_cmap("tab10").colors[:TOP], "lightgray"]
     left.stackplot(over_time.index, shares, labels=[elo.members.get(t, t) for t in top] + ["other"], colors=colors)
     left.set(xlabel="epoch", ylabel="probability of the team", xlim=(0, over_time.index.max()), ylim=(0, 1))
-    left.legend(loc="lower left", fontsize=7)
+    figure.legend(loc="outside lower left", fontsize=8, ncols=5, frameon=False)
     left.set_title("What the selector chooses")
 
     error = [elo.elo - elo.elo_low, elo.elo_high - elo.elo]

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from berteam_cli.acting import fixed_policies
+from berteam_cli.env.rps import Rps
+from berteam_cli.evaluation.tournament import schedule, tournament
+from berteam_cli.games import Games
+from berteam_cli.selector.base import unordered_teams
+from berteam_cli.workers import Workers
+
+
+def rps(team_size):
+    return Games(Rps(team_size), Workers(1))
+
+
+def test_rock_paper_scissors_is_a_cycle_of_equals():
+    standings = tournament(rps(1), fixed_policies(range(3)), unordered_teams(3, 1), 4, 0)
+    won, drawn, lost = standings.results.sum(axis=0)
+    np.testing.assert_array_equal(won, 4 * np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]))  # paper beats rock ...
+    np.testing.assert_array_equal(lost, won.T)
+    assert not drawn.any()
+    np.testing.assert_allclose(standings.elos, 1000, atol=1e-6)
+
+
+def test_sides_are_kept_apart():
+    standings = tournament(rps(1), fixed_policies(range(3)), unordered_teams(3, 1), 3, 0)
+    played = standings.results.sum(axis=1)
+    np.testing.assert_array_equal(played[0] + played[1], 3 * (1 - np.eye(3)))
+    assert played[0, 0, 1] == played[1, 1, 0] == 2  # of three games two with the first team as side 0
+
+
+@pytest.mark.parametrize(("games_per_pair", "distinct"), [(8, 4), (40, 4), (3, 2)])
+def test_orders_of_the_members(games_per_pair, distinct):
+    teams = np.array([[0, 1], [2, 3]])
+    rng = np.random.default_rng(0)
+    ours, theirs = schedule(teams, np.array([0]), np.array([1]), games_per_pair, rng)
+    assert ours.shape == (games_per_pair, 2)
+    assert (np.sort(ours) == [0, 1]).all()
+    assert (np.sort(theirs) == [2, 3]).all()
+    lineups = {(*a, *b) for a, b in zip(ours, theirs, strict=True)}
+    if games_per_pair >= 8:
+        assert len(lineups) == distinct
+    for k in range(0, games_per_pair - 1, 2):  # the same order once from either side
+        np.testing.assert_array_equal(ours[k], ours[k + 1])
+
+
+def test_large_teams_stand_in_drawn_orders():
+    teams = np.arange(10).reshape(2, 5)
+    ours, _ = schedule(teams, np.array([0]), np.array([1]), 20, np.random.default_rng(0))
+    assert (np.sort(ours) == np.arange(5)).all()
+    assert len({tuple(team) for team in ours}) > 5

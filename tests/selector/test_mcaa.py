@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from berteam_cli.selector.base import Field
+from berteam_cli.selector.mcaa import Mcaa, McaaState
+from tests.strategies import floats, outcomes
+
+ISLANDS = np.array([0, 0, 1, 2, 2, 2])
+RNG = np.random.default_rng(0)
+
+
+def mcaa(train_every=1, learning_rate=0.2, team_size=2):
+    return Mcaa(Field(ISLANDS, team_size), learning_rate, train_every)
+
+
+@given(floats(3), st.integers(0, 2**32))
+def test_the_step_is_the_gradient_of_half_the_squared_error(logits, seed):
+    """O7: the same step as autograd of -eta / 2 ||q - softmax(theta)||^2."""
+    rng = np.random.default_rng(seed)
+    teams = rng.integers(6, size=(5, 2, 2))
+    games = outcomes(teams, np.tile([1.0, 0], (5, 1)))
+    learnt, _ = mcaa().learn(McaaState(logits, np.zeros(3, dtype=int), 0), games, RNG)
+
+    theta = torch.tensor(logits, requires_grad=True)
+    q = torch.tensor(np.bincount(ISLANDS[teams[:, 0].ravel()], minlength=3) / 10)
+    (-0.2 / 2 * ((q - torch.softmax(theta, 0)) ** 2).sum()).backward()
+    np.testing.assert_allclose(learnt.logits, logits + theta.grad.numpy(), atol=1e-12)
+
+
+@given(floats(3))
+def test_distribution(logits):
+    selector, state = mcaa(), McaaState(logits, np.zeros(3, dtype=int), 0)
+    found = selector.distribution(state)
+    assert found.probability.sum() == pytest.approx(1)
+    shares = state.shares / [2, 1, 3]
+    by_team = dict(zip(map(tuple, found.teams), found.probability, strict=True))
+    assert by_team[0, 0] == pytest.approx(shares[0] ** 2)
+    assert by_team[1, 2] == pytest.approx(2 * shares[0] * shares[1])
+    np.testing.assert_allclose(selector.captains(state), shares[ISLANDS])
+
+
+def test_sampled_teams_come_as_often_as_the_distribution_says():
+    selector, state = mcaa(), McaaState(np.array([0.5, -1, 0]), np.zeros(3, dtype=int), 0)
+    found = selector.distribution(state)
+    drawn = np.sort(selector.sample(state, 20_000, np.random.default_rng(1)), axis=1)
+    counts = [(drawn == team).all(axis=1).mean() for team in found.teams]
+    np.testing.assert_allclose(counts, found.probability, atol=0.012)
+
+
+def test_only_winners_count_and_only_every_so_many_epochs():
+    selector = mcaa(train_every=2)
+    state = selector.init(RNG)
+    games = outcomes([[[2, 2], [0, 0]], [[0, 1], [3, 3]]], [[1, 0], [0.5, 0.5]])
+    once, said = selector.learn(state, games, RNG)
+    np.testing.assert_array_equal(once.logits, 0)
+    np.testing.assert_array_equal(once.wins, [0, 2, 0])
+    assert said.updates == 0
+    assert said.buffer == 1
+    twice, said = selector.learn(once, outcomes([[[4, 4], [0, 0]]], [[1, 0]]), RNG)
+    assert said.updates == 1
+    assert twice.logits[0] < 0
+    assert twice.logits[1] == pytest.approx(twice.logits[2])
+    np.testing.assert_array_equal(twice.wins, 0)
+    np.testing.assert_array_equal(state.wins, 0)  # the state before is as it was
+
+
+def test_no_wins_no_step():
+    drawn = outcomes([[[0, 0], [2, 2]]], [[0.5, 0.5]])
+    after, said = mcaa().learn(mcaa().init(RNG), drawn, RNG)
+    np.testing.assert_array_equal(after.logits, 0)
+    assert said.updates == 0
+
+
+def test_log_chances_are_those_of_the_ordered_team():
+    selector, state = mcaa(), McaaState(np.array([0.5, -1, 0]), np.zeros(3, dtype=int), 0)
+    lineups = selector.select(state, 7, np.zeros(6, dtype=int), np.random.default_rng(2))
+    chances = selector.captains(state)[lineups.teams].prod(axis=2)
+    np.testing.assert_allclose(np.exp(lineups.log_chances), chances)
+    assert (lineups.captains == -1).all()
+
+
+def test_tensors_and_back():
+    state = McaaState(np.array([0.5, -1, 0]), np.array([1, 2, 3]), 5)
+    again = mcaa().restored(mcaa().tensors(state))
+    np.testing.assert_array_equal(again.logits, state.logits)
+    np.testing.assert_array_equal(again.wins, state.wins)
+    assert again.epochs == 5
