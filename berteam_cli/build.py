@@ -102,17 +102,17 @@ def archipelago(config: TrainConfig, game: Env) -> tuple[Island, ...]:
         key = f"population.islands.{name}"
         first = islands[-1].first + islands[-1].size if islands else 0
         if settings.learner.name == "fixed":
-            made, names = fixed_members(settings, game, key)
+            made = fixed_members(settings, game, key)
         else:
-            made, names = learner(settings.learner, game, key), [f"{name}.{m}" for m in range(settings.size)]
-        islands.append(Island(name, first, settings.size, made, tuple(names)))
+            made = learner(settings.learner, game, key)
+        islands.append(Island(name, first, settings.size, made))
     if not islands:
         raise InputError("population.islands must have at least one island, but has none.")
     return tuple(islands)
 
 
-def fixed_members(settings: IslandConfig, game: Env, key: str) -> tuple[Learner[Any], list[str]]:
-    """Returns the learner of an island of fixed policies, and the names of its members.
+def fixed_members(settings: IslandConfig, game: Env, key: str) -> Learner[Any]:
+    """Returns the learner of an island of fixed policies.
 
     Raises:
         InputError: a policy is not the game's, or they are not as many as the island has members.
@@ -123,7 +123,7 @@ def fixed_members(settings: IslandConfig, game: Env, key: str) -> tuple[Learner[
         raise InputError(
             f"{key}.size must be {len(names)}, as {key}.learner.policies names so many, but is {settings.size}."
         )
-    return FixedLearner([game.fixed_policies.index(x) for x in names]), names
+    return FixedLearner(tuple(game.fixed_policies.index(x) for x in names), game.fixed_policies)
 
 
 def check_policies(names: list[str], game: Env, key: str) -> None:

@@ -22,14 +22,12 @@ class Island:
         first: index of its first member in the population.
         size: M, how many members it has.
         learner: how they learn.
-        names: of its members.
     """
 
     name: str
     first: int
     size: int
     learner: Learner[Any]
-    names: tuple[str, ...]
 
     @property
     def members(self) -> slice:
@@ -89,6 +87,15 @@ def founded(islands: tuple[Island, ...], fitness: float, rng: Generator) -> Popu
 def island_of(islands: tuple[Island, ...]) -> Ints:
     """Returns (N,) the island of each member."""
     return np.repeat(np.arange(len(islands)), [island.size for island in islands])
+
+
+def names(islands: tuple[Island, ...], population: Population) -> list[str]:
+    """Returns what every member is called."""
+    return [
+        name
+        for island, mind in zip(islands, population.minds, strict=True)
+        for name in island.learner.names(mind, island.name)
+    ]
 
 
 def policies(islands: tuple[Island, ...], population: Population, *, explore: bool) -> Policies:

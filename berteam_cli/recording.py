@@ -11,7 +11,7 @@ import numpy as np
 
 from berteam_cli.learner.base import LEARNING_FIGURES
 from berteam_cli.outcomes import Outcomes
-from berteam_cli.population import island_of
+from berteam_cli.population import island_of, names
 from berteam_cli.records import COLUMNS, Tables, team_name, team_names
 from berteam_cli.selector.base import TeamDistribution, measured
 from berteam_cli.training import RECORDS, Clock, Parts, Report, Run, generator
@@ -82,11 +82,11 @@ class Recorder:
         """Returns one row for each member."""
         people = run.population
         fitness = self.parts.optimizer.fitness.shown(people.fitness)
+        called = names(self.parts.optimizer.islands, people)
         for island in self.parts.optimizer.islands:
-            for row in range(island.size):
-                n = island.first + row
+            for n in range(island.first, island.first + island.size):
                 yield (
-                    *(run.epoch, n, island.names[row], island.name, island.learner.algorithm, fitness[n]),
+                    *(run.epoch, n, called[n], island.name, island.learner.algorithm, fitness[n]),
                     *(people.age[n], people.games[n], people.captain_games[n], people.parent[n], people.behaviour[n]),
                 )
 

@@ -42,11 +42,7 @@ def test_the_installed_wheel_trains(wheel, tmp_path):
     work.mkdir()
     install = [sys.executable, "-m", "pip", "install", "--no-deps", "--quiet", "--target", site, wheel]
     subprocess.run(install, check=True)
-    run = [
-        sys.executable,
-        "-c",
-        "from berteam_cli.cli import main; import berteam_cli; print(berteam_cli.__file__); main()",
-    ]
+    program = "import berteam_cli; print(berteam_cli.__file__); from berteam_cli.cli import main; main()"
     words = ["train", "env=rps", "population=ppo6", "selector=mcaa", "epochs=2", "out=run"]
     command = [sys.executable, "-c", program, *words]
     environment = {**os.environ, "PYTHONPATH": str(site)}

@@ -21,7 +21,7 @@ from berteam_cli.evaluation.tournament import Standings, tournament
 from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder, read_manifest
 from berteam_cli.games import Games
 from berteam_cli.outcomes import Ints
-from berteam_cli.population import policies
+from berteam_cli.population import names, policies
 from berteam_cli.recording import game_rows
 from berteam_cli.records import COLUMNS, team_name, team_names, write_table
 from berteam_cli.selector.base import SAMPLES, measured, team_count, unordered_teams
@@ -43,7 +43,7 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> Non
     Raises:
         InputError: the config does not go together, or the folder is not free.
     """
-    games, acting, teams, names = players(config)
+    games, acting, teams, called = players(config)
     pairs = len(teams) * (len(teams) - 1) // 2
     folder = folder or new_folder("tournament")
     claim(folder, config.on_exists)
@@ -54,7 +54,7 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> Non
         manifest = Manifest(folder, seed=config.seed, teams=len(teams), pairs=pairs, **facts)
         log.info("%d teams, %d pairs, %d games each.", len(teams), pairs, config.games_per_pair)
         standings = tournament(games, acting, teams, config.games_per_pair, config.seed)
-        write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, names))
+        write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, called))
         write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
         write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
         manifest.end("done")
@@ -79,9 +79,9 @@ def of_fixed_policies(config: TournamentConfig) -> tuple[Games, Policies, Ints, 
         InputError: they are too many.
     """
     games = build.games(config)
-    names = games.env.fixed_policies
-    check_size(team_count(len(names), config.team_size), f"team_size={config.team_size}", config)
-    return games, fixed_policies(range(len(names))), unordered_teams(len(names), config.team_size), list(names)
+    called = games.env.fixed_policies
+    check_size(team_count(len(called), config.team_size), f"team_size={config.team_size}", config)
+    return games, fixed_policies(range(len(called))), unordered_teams(len(called), config.team_size), list(called)
 
 
 def check_size(teams: int, said: str, config: TournamentConfig) -> None:
@@ -111,16 +111,16 @@ def of_run(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
     found = measured(parts.selector, run.selection, SAMPLES, generator(parts.seed, RECORDS, run.epoch))
     check_size(min(config.top, len(found.teams)), f"top={config.top}", config)
     top = np.sort(np.argsort(-found.probability, kind="stable")[: config.top])
-    return parts.games, acting, found.teams[top], [name for i in parts.optimizer.islands for name in i.names]
+    return parts.games, acting, found.teams[top], names(parts.optimizer.islands, run.population)
 
 
-def elo_rows(standings: Standings, names: list[str]) -> Iterator[tuple[Any, ...]]:
+def elo_rows(standings: Standings, called: list[str]) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of elo.csv, the strongest team first; nobody predicted anything here."""
     won, drawn, lost = standings.results.sum(axis=0).sum(axis=2)
     for rank, k in enumerate(np.argsort(-standings.elos, kind="stable"), start=1):
         elo, width, team = standings.elos[k], standings.half_widths[k], standings.teams[k]
         yield (
-            *(team_name(team), " + ".join(names[m] for m in team), elo, elo - width, elo + width),
+            *(team_name(team), " + ".join(called[m] for m in team), elo, elo - width, elo + width),
             *(won[k] + drawn[k] + lost[k], won[k], drawn[k], lost[k], math.nan, rank, math.nan, math.nan),
         )
 

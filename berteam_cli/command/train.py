@@ -26,7 +26,7 @@ from berteam_cli.errors import RunError
 from berteam_cli.evaluation.reference import Reference, reference, reference_teams
 from berteam_cli.evaluation.truth import Truth, choose_teams, truth
 from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
-from berteam_cli.population import policies
+from berteam_cli.population import Population, names, policies
 from berteam_cli.recording import Recorder
 from berteam_cli.records import COLUMNS, Tables, team_name, team_names, write_table
 from berteam_cli.training import EVALUATION, Parts, Run, begin, epoch, generator
@@ -168,7 +168,7 @@ def evaluated(
             "reference": known.source,
         }
     )
-    write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(parts, rated))
+    write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(parts, run.population, rated))
     expected, width = rated.expected_elo()
     best = int(np.argmax(rated.elos)) if len(rated.teams) else None
     row = (
@@ -180,16 +180,16 @@ def evaluated(
     return expected
 
 
-def elo_rows(parts: Parts, rated: Truth) -> Iterator[tuple[Any, ...]]:
+def elo_rows(parts: Parts, population: Population, rated: Truth) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of elo.csv, the strongest team first."""
-    names = [name for island in parts.optimizer.islands for name in island.names]
+    called = names(parts.optimizer.islands, population)
     predicted = rated.predicted_elos()
     order = np.argsort(-rated.elos, kind="stable")
     place = np.empty(len(order), dtype=int)
     place[np.argsort(-rated.probability, kind="stable")] = np.arange(1, len(order) + 1)
     for rank, k in enumerate(order, start=1):
         yield (
-            *(team_names(rated.teams[[k]])[0], " + ".join(names[m] for m in rated.teams[k])),
+            *(team_names(rated.teams[[k]])[0], " + ".join(called[m] for m in rated.teams[k])),
             *(rated.elos[k], rated.elos[k] - rated.half_widths[k], rated.elos[k] + rated.half_widths[k]),
             *(rated.wins[k] + rated.draws[k] + rated.losses[k], rated.wins[k], rated.draws[k], rated.losses[k]),
             *(rated.probability[k], rank, predicted[k] if np.isfinite(predicted[k]) else math.nan, place[k]),

@@ -60,6 +60,9 @@ class Learner(Protocol[S]):
     def policies(self, state: S, *, explore: bool) -> Policies:
         """Returns how the members act; without ``explore`` as they are evaluated."""
 
+    def names(self, state: S, island: str) -> list[str]:
+        """Returns what to call the members of ``island``; a copy of a fixed policy has that policy's name."""
+
     def learn(self, state: S, experience: Experience, first: int, rng: Generator, workers: Workers) -> list[Learning]:
         """Lets members ``first`` and following learn from their trajectories in ``experience``.
 

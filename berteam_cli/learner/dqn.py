@@ -99,6 +99,10 @@ class Dqn:
         chance = self.epsilon(state.collected) if explore else 0.0
         return networks(GREEDY, layers(state.trained.weights, self.sizes), tanh=False, epsilon=chance)
 
+    def names(self, state: DqnState, island: str) -> list[str]:
+        """Returns the island's name with the member's number in it."""
+        return [f"{island}.{row}" for row in range(len(state.collected))]
+
     def learn(
         self, state: DqnState, experience: Experience, first: int, rng: Generator, workers: Workers
     ) -> list[Learning]:

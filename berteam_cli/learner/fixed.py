@@ -22,9 +22,11 @@ class Fixed:
 
     Attributes:
         indices: of the game's fixed policies, one for each member.
+        policies_by_name: all fixed policies of the game, in its order.
     """
 
     indices: tuple[int, ...]
+    policies_by_name: tuple[str, ...]
 
     algorithm: ClassVar[str] = "fixed"
 
@@ -37,6 +39,10 @@ class Fixed:
     def policies(self, state: Ints, *, explore: bool) -> Policies:
         """Returns the fixed policies, which are the same whether they ``explore`` or not."""
         return fixed_policies(state)
+
+    def names(self, state: Ints, island: str) -> list[str]:
+        """Returns the names of the policies."""
+        return [self.policies_by_name[index] for index in state]
 
     def learn(
         self, state: Ints, experience: Experience, first: int, rng: Generator, workers: Workers

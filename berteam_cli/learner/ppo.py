@@ -98,6 +98,10 @@ class Ppo:
         """Returns the members' stochastic policies; they are evaluated as they play, whatever ``explore`` is."""
         return networks(SAMPLED, layers(state.trained.weights, self.policy_sizes), tanh=True)
 
+    def names(self, state: PpoState, island: str) -> list[str]:
+        """Returns the island's name with the member's number in it."""
+        return [f"{island}.{row}" for row in range(len(state.filled))]
+
     def learn(
         self, state: PpoState, experience: Experience, first: int, rng: Generator, workers: Workers
     ) -> list[Learning]:

@@ -15,7 +15,7 @@ def islands(*sizes):
     made, first = [], 0
     for k, size in enumerate(sizes):
         indices = list(range(first, first + size))
-        made.append(Island(f"island{k}", first, size, Fixed(indices), tuple(f"m{i}" for i in indices)))
+        made.append(Island(f"island{k}", first, size, Fixed(tuple(indices), tuple("abcdefghijkl"))))
         first += size
     return tuple(made)
 
