@@ -78,6 +78,7 @@ def composed(word: str, words: list[str]) -> None:
     from berteam_cli.compose import arguments, check, prepare  # noqa: PLC0415
 
     prepare()
+    Sweeps.failed, Sweeps.table = 0, None
     given = arguments(words)
     if not (given.help or given.hydra_help or given.shell_completion):
         check(word, words, lambda config: None if given.cfg or given.info else verify(word, config))

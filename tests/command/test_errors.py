@@ -1,7 +1,6 @@
 """Wrong input: one sentence with what is right, exit code 2, nothing left behind."""
 
 import re
-import sys
 
 import pytest
 
@@ -60,13 +59,8 @@ CASES = {
 
 
 @pytest.mark.parametrize(("words", "said"), CASES.items(), ids=" ".join)
-def test_wrong_input(words, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["berteam", *words])
-    with pytest.raises(SystemExit) as stopped:
-        cli.main()
-    error = capsys.readouterr().err
-    assert stopped.value.code == cli.WRONG, error
+def test_wrong_input(words, said, tmp_path, berteam):
+    error = berteam(*words, code=cli.WRONG).stderr
     assert re.search(said, error), error
     assert error.count("\n") == 1, error
     assert error.startswith("berteam: ")
@@ -74,8 +68,8 @@ def test_wrong_input(words, said, tmp_path, monkeypatch, capsys):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_as_a_process(berteam, tmp_path):
-    done = berteam("train", "selector=mcca", code=2)
+def test_as_a_process(process, tmp_path):
+    done = process("train", "selector=mcca", code=2)
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []

@@ -82,9 +82,9 @@ def test_every_selector_with_every_optimizer(selector, optimizer, berteam, tmp_p
     assert tables["agents"].aggression.notna().any() == (optimizer == "mapelites")
 
 
-def test_fixed_policies(berteam, tmp_path):
+def test_fixed_policies(process, tmp_path):
     words = ["optimizer=fixed", "population=fixed_policies", *TINY, *SMALL_BERTEAM, "out=run"]
-    berteam("train", *words, "evaluation.games=10000")
+    process("train", *words, "evaluation.games=10000")
     tables = check_tables(tmp_path / "run", 7)
     assert len(tables["elo"]) == 28
     assert len(tables["generations"]) == 0
@@ -170,9 +170,9 @@ def test_a_failed_run_says_so_and_keeps_its_state(berteam, tmp_path):
     assert "Traceback" not in done.stderr
 
 
-def test_sweep(berteam, tmp_path):
+def test_sweep(process, tmp_path):
     words = ["-m", "selector=uniform,mcaa", "seed=0,1", "population=islands4x3", "hydra.sweep.dir=sweep"]
-    berteam("train", *words, *TINY, "epochs=2", "evaluation.games=112")
+    process("train", *words, *TINY, "epochs=2", "evaluation.games=112")
     table = pd.read_csv(tmp_path / "sweep" / "sweep.csv")
     assert list(table.job) == [0, 1, 2, 3]
     assert (table.status == "done").all()
