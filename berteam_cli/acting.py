@@ -36,11 +36,6 @@ class Policies(NamedTuple):
     epsilon: npt.NDArray[np.float32]
     weights: npt.NDArray[np.float32]
 
-    @property
-    def widest(self) -> int:
-        """Largest number of values in any layer."""
-        return max(1, int(self.sizes.max(initial=1)))
-
 
 def fixed_policies(indices: npt.ArrayLike) -> Policies:
     """Returns one row for each of the game's fixed policies in ``indices``."""
@@ -101,7 +96,7 @@ def act(policies: Policies, k: int, observation: np.ndarray, work: np.ndarray, c
         policies: the table.
         k: row of a SAMPLED or GREEDY policy.
         observation: (O,) float32.
-        work: (2, policies.widest) float32 scratch; changed.
+        work: (2, at least the widest layer) float32 scratch; changed.
         chance: in [0, 1), decides whether a GREEDY policy explores.
         choice: in [0, 1), decides which action is drawn.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -34,6 +35,8 @@ from berteam_cli.workers import Workers, available_cores
 
 ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps}
 SELECTORS: dict[str, Callable[..., Selector[Any]]] = {"uniform": Uniform, "mcaa": Mcaa, "berteam": Berteam}
+NO_NAMES = {"na", "nan", "null", "none", "n-a", "other"}  # pandas reads most of these as nothing
+
 LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": Ppo, "dqn": Dqn}
 
 
@@ -100,6 +103,8 @@ def archipelago(config: TrainConfig, game: Env) -> tuple[Island, ...]:
     islands: list[Island] = []
     for name, settings in config.population.islands.items():
         key = f"population.islands.{name}"
+        if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or name.lower() in NO_NAMES:
+            raise InputError(f"{key}: an island's name must be a word that tables can hold, but is {name!r}.")
         first = islands[-1].first + islands[-1].size if islands else 0
         if settings.learner.name == "fixed":
             made = fixed_members(settings, game, key)
@@ -205,6 +210,6 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
     if name == "coevolution":
         return Coevolution(islands, rule, playing.workers, **settings)
     names = settings.pop("opponents") or list(playing.env.fixed_policies)
-    check_policies(names, playing.env, "optimizer.opponents")
+    check_policies(names, playing.env, "optimizer.opponents, which may be [] for all,")
     indices = tuple(playing.env.fixed_policies.index(x) for x in names)
     return MapElites(islands, rule, playing.workers, opponents=opponents(indices, config.team_size), **settings)

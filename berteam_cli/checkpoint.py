@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
+import logging
 import os
 import shutil
 from dataclasses import dataclass
@@ -16,6 +18,8 @@ from safetensors.torch import load_file, save_file
 from berteam_cli.errors import RunError
 from berteam_cli.population import ARRAYS, Population
 from berteam_cli.training import Parts, Run
+
+log = logging.getLogger("berteam")
 
 SCHEMA = 1  # raised when a file of an older version could be misread
 KEPT = 2
@@ -62,8 +66,19 @@ def save(folder: Path, saved: Saved, parts: Parts) -> None:
             os.fsync(opened.fileno())
     shutil.rmtree(final, ignore_errors=True)
     os.replace(part, final)
+    sync(place)
     for old in sorted(place.glob("epoch_*"))[:-KEPT]:
         shutil.rmtree(old)
+
+
+def sync(folder: Path) -> None:
+    """Makes sure that the names in ``folder`` are on the disk, where the system can say so."""
+    with contextlib.suppress(OSError):
+        opened = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(opened)
+        finally:
+            os.close(opened)
 
 
 def load(folder: Path, parts: Parts) -> Saved:
@@ -76,8 +91,9 @@ def load(folder: Path, parts: Parts) -> Saved:
     for place in sorted((folder / "checkpoint").glob("epoch_*"), reverse=True):
         try:
             return read(place, parts)
-        except (OSError, ValueError, KeyError, SafetensorError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, SafetensorError) as error:
             damage = f"{place.name} is damaged: {error}"
+            log.warning("Checkpoint %s; the one before is tried.", damage)
     raise RunError(f"{folder} has no checkpoint to go on from ({damage}).")
 
 

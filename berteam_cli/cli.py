@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
+import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +60,9 @@ def main() -> None:
         sys.exit(FAILED)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
+    except BrokenPipeError:  # whoever read our output has seen enough, as head does
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (python flushes it at exit)
+        sys.exit(0)
 
 
 def run(word: str, words: list[str]) -> None:
@@ -81,7 +87,7 @@ def composed(word: str, words: list[str]) -> None:
     Sweeps.failed, Sweeps.table = 0, None
     given = arguments(words)
     if not (given.help or given.hydra_help or given.shell_completion):
-        check(word, words, lambda config: None if given.cfg or given.info else verify(word, config))
+        check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
     sys.argv = [f"berteam {word}", *words]
     task = {"train": train_task, "tournament": tournament_task}[word]
     try:
@@ -92,8 +98,8 @@ def composed(word: str, words: list[str]) -> None:
         raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
 
 
-def verify(word: str, config: Any) -> None:
-    """Checks that the parts of a config go together.
+def verify(word: str, config: Any, keys: list[str]) -> None:
+    """Checks that the parts of a config go together, and that the overridden ``keys`` have an effect.
 
     Raises:
         InputError: they do not.
@@ -101,7 +107,10 @@ def verify(word: str, config: Any) -> None:
     from berteam_cli import build  # noqa: PLC0415
     from berteam_cli.command.tournament import players  # noqa: PLC0415
 
-    {"train": build.parts, "tournament": players}[word](config)
+    if word == "train":
+        build.parts(config)
+    else:
+        players(config, keys)
 
 
 class Sweeps:
@@ -117,25 +126,31 @@ def train_task(cfg: DictConfig) -> float:
     from hydra.types import RunMode  # noqa: PLC0415
     from omegaconf import OmegaConf  # noqa: PLC0415
 
-    from berteam_cli.command.sweep import swept  # noqa: PLC0415
     from berteam_cli.command.train import train  # noqa: PLC0415
     from berteam_cli.config import checked  # noqa: PLC0415
 
     text = OmegaConf.to_yaml(cfg, resolve=True)
-    hydra_config = HydraConfig.get()
-    if hydra_config.mode != RunMode.MULTIRUN:
+    if HydraConfig.get().mode != RunMode.MULTIRUN:
         config = checked(cfg)
         return outside(lambda: train(config, text, Path(config.out) if config.out else None))
-    folder = Path(hydra_config.runtime.output_dir)
-    overrides = [x for x in hydra_config.overrides.task]
-    Sweeps.table = folder.parent / "sweep.csv"
-    expected, ok = swept(lambda: train(checked(cfg), text, folder), folder, overrides)
+    return job(lambda folder: train(checked(cfg), text, folder))
+
+
+def job(task: Callable[[Path], float]) -> float:
+    """Runs ``task`` as one job of a sweep, in the job's folder; returns what it returns, NaN if it failed."""
+    from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
+
+    from berteam_cli.command.sweep import TABLE, swept  # noqa: PLC0415
+
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    Sweeps.table = folder.parent / TABLE
+    figure, ok = swept(lambda: task(folder), folder, list(HydraConfig.get().overrides.task))
     Sweeps.failed += not ok
-    return expected
+    return figure
 
 
-def tournament_task(cfg: DictConfig) -> None:
-    """Plays a tournament; what Hydra calls."""
+def tournament_task(cfg: DictConfig) -> float:
+    """Plays a tournament; what Hydra calls. Returns NaN: a tournament has no figure to look for the best of."""
     from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
     from hydra.types import RunMode  # noqa: PLC0415
     from omegaconf import OmegaConf  # noqa: PLC0415
@@ -144,10 +159,10 @@ def tournament_task(cfg: DictConfig) -> None:
     from berteam_cli.config import checked  # noqa: PLC0415
 
     config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
-    folder = Path(config.out) if config.out else None
-    if HydraConfig.get().mode == RunMode.MULTIRUN:
-        folder = Path(HydraConfig.get().runtime.output_dir)
-    outside(lambda: play(config, text, folder))
+    if HydraConfig.get().mode != RunMode.MULTIRUN:
+        outside(lambda: play(config, text, Path(config.out) if config.out else None))
+        return math.nan
+    return job(lambda folder: play(config, text, folder) or math.nan)
 
 
 def outside(task: Any) -> Any:

@@ -17,6 +17,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from berteam_cli.config import checked, one_line, register
 from berteam_cli.errors import InputError, did_you_mean
+from berteam_cli.folder import MANIFEST
 
 CONF = "berteam_cli.conf"
 HIDDEN = ("schema", "hydra")  # groups no user chooses from
@@ -43,25 +44,27 @@ def arguments(words: list[str]) -> Any:
     return parser.parse_args(words)
 
 
-def check(command: str, words: list[str], verify: Callable[[Any], object]) -> None:
+def check(command: str, words: list[str], verify: Callable[[Any, list[str]], object]) -> None:
     """Composes what the command line asks for and checks it, every value of a sweep once.
 
     Args:
         command: name of the primary config.
         words: the command line after the sub-command.
-        verify: raises InputError where parts of a checked config do not go together.
+        verify: raises InputError where parts of a checked config do not go together; is told the overridden keys too.
 
     Raises:
         InputError: a choice, a key or a value is wrong.
     """
     given = arguments(words)
-    searched = [f"hydra.searchpath=[file://{Path(given.config_dir).absolute()}]"] if given.config_dir else []
+    searched = [f"hydra.searchpath=['file://{Path(given.config_dir).absolute()}']"] if given.config_dir else []
     if given.config_dir and not Path(given.config_dir).is_dir():
         raise InputError(f"--config-dir must be a folder, but {given.config_dir} is none.")
     with initialize_config_module(CONF, version_base="1.3", job_name=command):
         overrides = parsed(given.overrides)
         if given.multirun and any(x.key_or_group == "out" for x in overrides):
             raise InputError("out is one folder for all runs of a sweep; use hydra.sweep.dir=DIR instead.")
+        if given.multirun:
+            check_sweep_folder(overrides)
         for override in overrides:
             if override.is_sweep_override() and not given.multirun:
                 raise InputError(f"{override.input_line} is a sweep over several values; add --multirun (-m) for one.")
@@ -69,7 +72,20 @@ def check(command: str, words: list[str], verify: Callable[[Any], object]) -> No
         for job in jobs(overrides, sweep=given.multirun):
             config = composed(given.config_name or command, searched, job)
             check_learner(config, job)
-            verify(checked(config))
+            verify(checked(config), [x.key_or_group for x in job])
+
+
+def check_sweep_folder(overrides: list[Override]) -> None:
+    """Checks that the folder named for a sweep holds none yet: its runs would be taken for this one's.
+
+    Raises:
+        InputError: it does.
+    """
+    for override in overrides:
+        if override.key_or_group == "hydra.sweep.dir":
+            folder = Path(str(override.value()))
+            if folder.is_dir() and any((job / MANIFEST).exists() for job in folder.iterdir()):
+                raise InputError(f"hydra.sweep.dir={folder} holds a sweep already; choose another folder.")
 
 
 def parsed(overrides: list[str]) -> list[Override]:
@@ -138,6 +154,8 @@ def said(error: Exception) -> str:
     """Returns in one line what Hydra or OmegaConf object to: the innermost cause says it best."""
     while isinstance(error.__cause__, HydraException | OmegaConfBaseException):
         error = error.__cause__
+    if isinstance(error, HydraException) and isinstance(error.__context__, OmegaConfBaseException):
+        error = error.__context__
     if isinstance(error, OmegaConfBaseException):
         return one_line(error)
     return f"{str(error).splitlines()[0].rstrip('.')}."

@@ -209,7 +209,7 @@ class EvaluationConfig:
 
     games: int | None = number()
     games_per_pair: int = number(1)
-    reference_teams: int = number(1)
+    reference_teams: int = number(2)
 
 
 @dataclass

@@ -8,6 +8,7 @@ import os
 import platform
 import shutil
 import sys
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -15,10 +16,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from berteam_cli.errors import InputError
+from berteam_cli.errors import InputError, RunError
 from berteam_cli.records import COLUMNS
 
-MANIFEST, CONFIG, LOG = "manifest.json", "config.yaml", "log.txt"
+MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
 PACKAGES = ("berteam-cli", "torch", "numpy", "numba", "pandas", "stable-baselines3", "pettingzoo", "hydra-core")
 
 log = logging.getLogger("berteam")
@@ -43,7 +44,7 @@ def claim(folder: Path, on_exists: str) -> None:
                 f"out={folder} holds a run already; choose another folder, "
                 f"or on_exists=overwrite to replace it, or on_exists=resume to go on with it."
             )
-        for name in (*(f"{table}.csv" for table in COLUMNS), MANIFEST, CONFIG, LOG):
+        for name in (*(f"{table}.csv" for table in COLUMNS), MANIFEST, CONFIG, LOG, ERROR):
             (folder / name).unlink(missing_ok=True)
         shutil.rmtree(folder / "checkpoint", ignore_errors=True)
     made = missing(folder)
@@ -65,36 +66,80 @@ def missing(folder: Path) -> list[Path]:
 class Manifest:
     """What is known of a run beside its numbers, kept in manifest.json."""
 
-    def __init__(self, folder: Path, **facts: Any) -> None:
-        """Writes the manifest of a run that begins now."""
-        self.path = folder / MANIFEST
-        self.facts = {
-            "status": "running",
-            "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
-            "started": now(),
-            "ended": None,
-            "versions": {name: version(name) for name in PACKAGES},
-            "python": platform.python_version(),
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
-            "tables": 1,
-            **facts,
-        }
-        self.write()
+    def __init__(self, folder: Path, facts: dict[str, Any]) -> None:
+        """Takes what is known of the run in ``folder``; writes nothing."""
+        self.folder, self.facts = folder, facts
+
+    @classmethod
+    def of(cls, folder: Path) -> Manifest:
+        """Returns the manifest that is in ``folder``.
+
+        Raises:
+            InputError: there is none.
+        """
+        return cls(folder, read_manifest(folder))
+
+    @classmethod
+    def begun(cls, folder: Path, **facts: Any) -> Manifest:
+        """Returns the manifest of a run that begins now; it is in ``folder`` then."""
+        manifest = cls(folder, {"status": "running", "command": command_line(), "started": now(), "ended": None})
+        manifest.add(**circumstances() | facts)
+        return manifest
+
+    @classmethod
+    def resumed(cls, folder: Path, **facts: Any) -> Manifest:
+        """Returns the manifest of a run that goes on now; what was known of it is kept."""
+        manifest = cls.of(folder)
+        again = {"command": command_line(), "started": now()}
+        resumed = [*manifest.facts.get("resumed", []), again]
+        manifest.add(status="running", ended=None, resumed=resumed, **circumstances(), **facts)
+        return manifest
 
     def add(self, **facts: Any) -> None:
-        """Adds to what is known, and writes it."""
+        """Adds to what is known, and writes it; there is never half of the file."""
         self.facts |= facts
-        self.write()
-
-    def end(self, status: str) -> None:
-        """Tells how the run ended: done, failed or interrupted."""
-        self.add(status=status, ended=now())
-
-    def write(self) -> None:
-        """Writes the file; there is never half of it."""
-        part = self.path.with_suffix(".part")
+        part = (self.folder / MANIFEST).with_suffix(".part")
         part.write_text(json.dumps(self.facts, indent=1) + "\n", encoding="utf-8")
-        os.replace(part, self.path)
+        os.replace(part, self.folder / MANIFEST)
+
+    @contextmanager
+    def until_the_end(self, resumable: bool = True) -> Iterator[None]:
+        """Notes how what is done inside ends: done, interrupted or failed.
+
+        Raises:
+            RunError: it failed; the traceback is in error.txt.
+            KeyboardInterrupt: it was interrupted.
+        """
+        (self.folder / ERROR).unlink(missing_ok=True)
+        go_on = f"Go on with: berteam resume {self.folder}" if resumable else "Begin anew with on_exists=overwrite."
+        try:
+            yield
+        except KeyboardInterrupt:
+            self.add(status="interrupted", ended=now())
+            log.info("Interrupted. %s", go_on)
+            raise
+        except Exception as error:
+            (self.folder / ERROR).write_text(traceback.format_exc(), encoding="utf-8")
+            self.add(status="failed", ended=now())
+            raise RunError(
+                f"The run failed: {type(error).__name__}: {error} (traceback in {self.folder / ERROR}). {go_on}"
+            ) from error
+        self.add(status="done", ended=now())
+
+
+def circumstances() -> dict[str, Any]:
+    """Returns what a result may depend on beside the config."""
+    return {
+        "versions": {name: version(name) for name in PACKAGES},
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors",
+        "tables": 1,
+    }
+
+
+def command_line() -> list[str]:
+    """Returns the words this process was started with."""
+    return [Path(sys.argv[0]).name, *sys.argv[1:]]
 
 
 def now() -> str:
@@ -109,9 +154,12 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         InputError: there is no run.
     """
     try:
-        return json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{folder} is no folder of a run: it has no readable {MANIFEST}.") from error
+    if not isinstance(manifest, dict) or not {"status", "started", "command"} <= manifest.keys():
+        raise InputError(f"{folder} is no folder of a run: its {MANIFEST} is not one.")
+    return manifest
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import numpy as np
 
 from berteam_cli.acting import Policies
 from berteam_cli.env.base import Env, blank_results
-from berteam_cli.outcomes import NOBODY, Experience, Ints, Lineups, Outcomes
+from berteam_cli.outcomes import NOBODY, Bools, Experience, Ints, Lineups, Outcomes
 from berteam_cli.workers import Workers
 from mctf.draws import seed_of
 
@@ -74,19 +74,30 @@ def pairings(blue: Ints, red: Ints) -> Lineups:
     return Lineups(teams, nobody, np.full(teams.shape[:2], np.nan))
 
 
-def both_sides(ours: Ints, theirs: Ints) -> Lineups:
-    """Returns games of (B, T) teams ``ours`` against ``theirs``: even games with us as side 0, odd ones as side 1."""
-    teams = np.stack([ours, theirs], axis=1)
-    teams[1::2] = teams[1::2, ::-1]
-    return pairings(teams[:, 0], teams[:, 1])
+def in_turn(games: int, each: int) -> Bools:
+    """Returns (games,) which games a team plays as side 1: every second of its ``each`` games, not the first."""
+    return np.arange(games) % each % 2 == 1
 
 
-def as_side_0(outcomes: Outcomes) -> Outcomes:
+def both_sides(ours: Ints, theirs: Ints, each: int) -> Lineups:
+    """Returns games of (B, T) teams ``ours`` against ``theirs``, from either side in turn.
+
+    Args:
+        ours: ``each`` games of the same team in a row.
+        theirs: their opponents.
+        each: games of each team of ours; all teams are on the same side in their k-th game.
+    """
+    swapped = in_turn(len(ours), each)[:, np.newaxis]
+    return pairings(np.where(swapped, theirs, ours), np.where(swapped, ours, theirs))
+
+
+def as_side_0(outcomes: Outcomes, each: int) -> Outcomes:
     """Returns the outcomes of ``both_sides`` games with us as side 0 in every record."""
+    swapped = in_turn(len(outcomes.steps), each)
 
     def turned(per_side: np.ndarray) -> np.ndarray:
         per_side = per_side.copy()
-        per_side[1::2] = per_side[1::2, ::-1]
+        per_side[swapped] = per_side[swapped, ::-1]
         return per_side
 
     lineups = outcomes.lineups

@@ -90,13 +90,19 @@ class Experience:
     lengths: Ints
     terminated: Bools
 
-    def trajectories(self, first: int, size: int) -> list[tuple[int, int, int]]:
-        """Returns (row, game, player) of every trajectory of members ``first`` to ``first + size - 1``.
+    def trajectories(self, first: int, size: int) -> dict[int, list[tuple[int, int]]]:
+        """Returns (game, player) of each trajectory, in order, of every member that played.
 
-        ``row`` counts from ``first``. They are sorted by row, then game, then player, so that a member with
-        several places in one game contributes each of them, one after the other.
+        A member with several places in one game contributes each of them, one after the other.
+
+        Args:
+            first: a member.
+            size: how many members from ``first`` on to look for; in the result they are counted from ``first``.
         """
         game, player = np.nonzero((self.members >= first) & (self.members < first + size))
         row = self.members[game, player] - first
         order = np.lexsort((player, game, row))
-        return [(int(row[k]), int(game[k]), int(player[k])) for k in order]
+        played: dict[int, list[tuple[int, int]]] = {}
+        for k in order:
+            played.setdefault(int(row[k]), []).append((int(game[k]), int(player[k])))
+        return played

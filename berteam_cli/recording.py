@@ -35,19 +35,14 @@ class Recorder:
     every: int
     most_teams: int
 
-    def first(self, run: Run) -> None:
-        """Records the members and distributions before the first epoch, as epoch 0."""
-        self.state(run, self.distribution(run))
-
-    def epoch(self, run: Run, report: Report, *, last: bool) -> None:
-        """Records an epoch, and after every ``every``-th and the ``last`` one the state it led to."""
+    def epoch(self, run: Run, report: Report) -> None:
+        """Records an epoch, and after every ``every``-th one the state it led to."""
         clock = Clock()
         selecting = report.selecting
         entropy = effective = math.nan
-        if last or run.epoch % self.every == 0:
-            distribution = self.distribution(run)
-            self.state(run, distribution)
-            entropy, effective = distribution.entropy, math.exp(distribution.entropy)
+        if run.epoch % self.every == 0:
+            entropy = self.state(run).entropy
+            effective = math.exp(entropy)
         self.tables.add("games", game_rows(run.epoch, report.outcomes))
         self.tables.add("learning", self.learning_rows(run, report))
         self.tables.add("generations", self.generation_rows(run, report))
@@ -63,8 +58,14 @@ class Recorder:
         rng = generator(self.parts.seed, RECORDS, run.epoch)
         return measured(self.parts.selector, run.selection, self.most_teams, rng)
 
-    def state(self, run: Run, distribution: TeamDistribution) -> None:
-        """Records the members and the distributions over teams, captains and islands."""
+    def last(self, run: Run) -> None:
+        """Records the state after the last epoch, unless that is done."""
+        if run.epoch % self.every:
+            self.state(run)
+
+    def state(self, run: Run) -> TeamDistribution:
+        """Records the members and the distributions over teams, captains and islands; returns that over teams."""
+        distribution = self.distribution(run)
         self.tables.add("agents", self.agent_rows(run))
         rows = [(run.epoch, *row) for row in zip(team_names(distribution.teams), distribution.probability, strict=True)]
         if distribution.samples:
@@ -77,6 +78,7 @@ class Recorder:
         self.tables.add(
             "island_distribution", ((run.epoch, i.name, share) for i, share in zip(islands, shares, strict=True))
         )
+        return distribution
 
     def agent_rows(self, run: Run) -> Iterator[Row]:
         """Returns one row for each member."""

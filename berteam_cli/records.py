@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from berteam_cli.errors import RunError
 from berteam_cli.learner.base import LEARNING_FIGURES
 from berteam_cli.outcomes import Ints
 
@@ -79,6 +80,9 @@ class Tables:
         Args:
             folder: of the run.
             sizes: bytes of each table to keep, from a checkpoint; None starts them anew.
+
+        Raises:
+            RunError: a table has fewer bytes than that.
         """
         self.files = {}
         for name in GROWING:
@@ -86,6 +90,8 @@ class Tables:
             if sizes is None:
                 path.write_text(",".join(COLUMNS[name]) + "\n", encoding="utf-8")
             else:
+                if not path.exists() or path.stat().st_size < sizes[name]:
+                    raise RunError(f"{path} is shorter than when the last checkpoint was made; the run cannot go on.")
                 os.truncate(path, sizes[name])
             self.files[name] = path.open("a", encoding="utf-8", newline="")
 
@@ -95,7 +101,9 @@ class Tables:
         self.files[name].flush()
 
     def sizes(self) -> dict[str, int]:
-        """Returns the bytes of each table."""
+        """Returns the bytes of each table, all of which are on the disk then."""
+        for file in self.files.values():
+            os.fsync(file.fileno())
         return {name: file.tell() for name, file in self.files.items()}
 
     def close(self) -> None:

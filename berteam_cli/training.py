@@ -83,7 +83,7 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     lineups = selector.select(run.selection, parts.games_per_epoch, population.age, select)
     clock.lap("select_s")
     acting = policies(optimizer.islands, population, explore=True)
-    outcomes, experience = parts.games.play(acting, lineups, key(play), record=True)
+    outcomes, experience = parts.games.play(acting, lineups, key(play), record=optimizer.learns)
     population = optimizer.rate(population, outcomes)
     clock.lap("play_s")
     population, learnt = optimizer.train(population, experience, learn)
@@ -114,15 +114,15 @@ class Probes:
     key: int
     steps: int = 0
 
-    def play(self, population: Population, teams: Ints, opponents: Ints) -> Outcomes:
+    def play(self, population: Population, teams: Ints, opponents: Ints, each: int) -> Outcomes:
         """Returns the outcomes with ``teams`` as side 0; see ``optimizer.base.Probe``."""
         env = self.parts.games.env
         members = policies(self.parts.optimizer.islands, population, explore=False)
         acting = joined([members, fixed_policies(range(len(env.fixed_policies)))])
-        lineups = both_sides(teams, opponents + population.size)
+        lineups = both_sides(teams, opponents + population.size, each)
         outcomes, _ = self.parts.games.play(acting, lineups, self.key)
         self.steps += int(outcomes.steps.sum())
-        return as_side_0(outcomes)
+        return as_side_0(outcomes, each)
 
 
 class Clock:

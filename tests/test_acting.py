@@ -25,7 +25,7 @@ def torch_outputs(parts, k, observation, activation):
 
 
 def work(policies):
-    return np.zeros((2, policies.widest), dtype=np.float32)
+    return np.zeros((2, policies.sizes.max()), dtype=np.float32)
 
 
 @given(st.integers(0, 2**32), st.booleans(), st.sampled_from([(5,), (8, 8), (3, 9, 4)]))

@@ -97,11 +97,11 @@ def test_scores_are_captures_and_sides_are_told_apart():
 
 def test_both_sides_and_back():
     ours, theirs = np.array([[0, 0], [1, 1], [2, 2]]), np.array([[7, 7], [8, 8], [9, 9]])
-    lineups = both_sides(ours, theirs)
+    lineups = both_sides(ours, theirs, 3)
     np.testing.assert_array_equal(lineups.teams[:, 0, 0], [0, 8, 2])
     games = mctf(1, **SHORT)
     outcomes, _ = games.play(random_networks(10, games.env), lineups, 0)
-    turned = as_side_0(outcomes)
+    turned = as_side_0(outcomes, 3)
     np.testing.assert_array_equal(turned.lineups.teams[:, 0], ours)
     np.testing.assert_array_equal(turned.lineups.teams[:, 1], theirs)
     np.testing.assert_array_equal(

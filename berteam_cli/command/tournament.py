@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from omegaconf import OmegaConf
 
 from berteam_cli import build, checkpoint
 from berteam_cli.acting import Policies, fixed_policies
 from berteam_cli.command.inspect import show
-from berteam_cli.command.resume import stored_config
 from berteam_cli.config import TournamentConfig, checked
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.reference import table_name
 from berteam_cli.evaluation.tournament import Standings, tournament
-from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder, read_manifest
+from berteam_cli.folder import Manifest, claim, logging_to, new_folder, read_manifest
 from berteam_cli.games import Games
 from berteam_cli.outcomes import Ints
 from berteam_cli.population import names, policies
 from berteam_cli.recording import game_rows
 from berteam_cli.records import COLUMNS, team_name, team_names, write_table
 from berteam_cli.selector.base import SAMPLES, measured, team_count, unordered_teams
+from berteam_cli.stored import plain_config, stored_config, write_config
 from berteam_cli.training import RECORDS, generator
 
 log = logging.getLogger("berteam")
@@ -42,38 +44,68 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> Non
 
     Raises:
         InputError: the config does not go together, or the folder is not free.
+        RunError: it failed.
     """
-    games, acting, teams, called = players(config)
-    pairs = len(teams) * (len(teams) - 1) // 2
+    entry = players(config)
+    if config.run is not None:
+        text = with_game_of(Path(config.run), text)
     folder = folder or new_folder("tournament")
     claim(folder, config.on_exists)
-    (folder / CONFIG).write_text(text, encoding="utf-8")
+    write_config(folder, text)
+    pairs = len(entry.teams) * (len(entry.teams) - 1) // 2
     with logging_to(folder):
         log.info("%s", folder)
-        facts = {} if config.run else {"reference": table_name(games.env)}
-        manifest = Manifest(folder, seed=config.seed, teams=len(teams), pairs=pairs, **facts)
-        log.info("%d teams, %d pairs, %d games each.", len(teams), pairs, config.games_per_pair)
-        standings = tournament(games, acting, teams, config.games_per_pair, config.seed)
-        write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, called))
-        write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
-        write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
-        manifest.end("done")
+        manifest = Manifest.begun(folder, seed=config.seed, teams=len(entry.teams), pairs=pairs, **entry.facts)
+        log.info("%d teams, %d pairs, %d games each.", len(entry.teams), pairs, config.games_per_pair)
+        with manifest.until_the_end(resumable=False):
+            standings = tournament(entry.games, entry.policies, entry.teams, config.games_per_pair, config.seed)
+            write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, entry.names))
+            write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
+            write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
     show(folder, 10)
 
 
-def players(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
-    """Returns the game, how its players act, the teams that meet, (K, T), and the players' names.
+@dataclass(frozen=True)
+class Entry:
+    """Who plays in a tournament.
+
+    Attributes:
+        games: the game and its threads.
+        policies: how the players act.
+        teams: (K, T) players of each team.
+        names: of the players.
+        facts: for the manifest.
+    """
+
+    games: Games
+    policies: Policies
+    teams: Ints
+    names: list[str]
+    facts: dict[str, Any]
+
+
+def players(config: TournamentConfig, overridden: Collection[str] = ()) -> Entry:
+    """Returns who plays.
+
+    Args:
+        config: checked.
+        overridden: keys that the command line gave.
 
     Raises:
         InputError: the config does not go together, or there is no such run.
     """
     if config.on_exists == "resume":
         raise InputError("on_exists=resume is for training runs; a tournament takes error or overwrite.")
-    return of_run(config) if config.run else of_fixed_policies(config)
+    if config.run is None:
+        return of_fixed_policies(config)
+    for key in overridden:
+        if key.split(".", maxsplit=1)[0] in {"env", "team_size"}:
+            raise InputError(f"{key} has no effect with run={config.run}, whose game and team size are taken.")
+    return of_run(config)
 
 
-def of_fixed_policies(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
-    """Returns the same for all teams of the fixed policies.
+def of_fixed_policies(config: TournamentConfig) -> Entry:
+    """Returns all teams of the fixed policies.
 
     Raises:
         InputError: they are too many.
@@ -81,28 +113,45 @@ def of_fixed_policies(config: TournamentConfig) -> tuple[Games, Policies, Ints, 
     games = build.games(config)
     called = games.env.fixed_policies
     check_size(team_count(len(called), config.team_size), f"team_size={config.team_size}", config)
-    return games, fixed_policies(range(len(called))), unordered_teams(len(called), config.team_size), list(called)
+    return Entry(
+        games,
+        fixed_policies(range(len(called))),
+        unordered_teams(len(called), config.team_size),
+        list(called),
+        {"reference": table_name(games.env)},
+    )
+
+
+def with_game_of(run: Path, text: str) -> str:
+    """Returns the config ``text`` with the game and the team size of ``run``, which are what was played."""
+    config, trained = OmegaConf.create(text), plain_config(run)
+    config.env, config.team_size = trained.env, trained.team_size
+    return OmegaConf.to_yaml(config)
 
 
 def check_size(teams: int, said: str, config: TournamentConfig) -> None:
     """Checks that every pair of ``teams`` teams can play.
 
     Raises:
-        InputError: their games are more than MOST_GAMES; ``said`` is the setting that made them so many.
+        InputError: there is only one, or their games are more than MOST_GAMES; ``said`` is the setting to blame.
     """
+    if teams < 2:
+        raise InputError(f"{said} gives {teams} team, and a tournament needs two.")
     games = teams * (teams - 1) // 2 * config.games_per_pair
     if games > MOST_GAMES:
         raise InputError(f"{said} gives {teams:,} teams and {games:,} games; at most {MOST_GAMES:,} games are played.")
 
 
-def of_run(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
-    """Returns the same for the most probable teams of a trained run.
+def of_run(config: TournamentConfig) -> Entry:
+    """Returns the most probable teams of a trained run.
 
     Raises:
-        InputError: there is no such run.
+        InputError: there is no such run, or it has too few teams or too many.
     """
     folder = Path(str(config.run))
     read_manifest(folder)
+    if config.out and Path(config.out).resolve() == folder.resolve():
+        raise InputError(f"out must be another folder than run, but both are {config.out}.")
     trained = checked(stored_config(folder))
     trained.workers = config.workers
     parts = build.parts(trained)
@@ -111,7 +160,8 @@ def of_run(config: TournamentConfig) -> tuple[Games, Policies, Ints, list[str]]:
     found = measured(parts.selector, run.selection, SAMPLES, generator(parts.seed, RECORDS, run.epoch))
     check_size(min(config.top, len(found.teams)), f"top={config.top}", config)
     top = np.sort(np.argsort(-found.probability, kind="stable")[: config.top])
-    return parts.games, acting, found.teams[top], names(parts.optimizer.islands, run.population)
+    called = names(parts.optimizer.islands, run.population)
+    return Entry(parts.games, acting, found.teams[top], called, {"run": str(folder), "epoch": run.epoch})
 
 
 def elo_rows(standings: Standings, called: list[str]) -> Iterator[tuple[Any, ...]]:

@@ -2,18 +2,46 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
+from scipy.stats import t as student_t
 
 from berteam_cli.acting import Policies, fixed_policies, joined
 from berteam_cli.evaluation.reference import Reference
 from berteam_cli.games import Games, as_side_0, both_sides
-from berteam_cli.outcomes import Floats, Ints
+from berteam_cli.outcomes import Bools, Floats, Ints
 from berteam_cli.rating.bradley_terry import Z_95, held_ratings
 from berteam_cli.rating.elo import points
 from berteam_cli.selector.base import TeamDistribution
+
+NEGLIGIBLE = 1e-9  # probability that rounding leaves
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Which K teams are rated, and for what.
+
+    Attributes:
+        teams: (K, T) members in ascending order, each team once.
+        probability: (K,) of the selector to choose it; NaN where that is not known.
+        listed: (K,) whether a team is there for being among the most probable ones.
+        draws: (K,) how often a team was drawn, by its probability, from all those that are not listed.
+        listed_mass: probability of the listed teams together.
+    """
+
+    teams: Ints
+    probability: Floats
+    listed: Bools
+    draws: Ints
+    listed_mass: float
+
+    def __len__(self) -> int:
+        return len(self.teams)
 
 
 @dataclass(frozen=True)
@@ -21,89 +49,130 @@ class Truth:
     """Elos of K teams.
 
     Attributes:
-        teams: (K, T) members in ascending order.
-        probability: (K,) of the selector to choose them.
-        listed: (K,) whether a team is among the most probable ones; the others are a random sample of the rest.
+        chosen: the teams.
         elos: (K,).
         half_widths: (K,) of their 95 % intervals.
         wins, draws, losses: (K,) games.
-        steps: of all games.
     """
 
-    teams: Ints
-    probability: Floats
-    listed: np.ndarray
+    chosen: Chosen
     elos: Floats
     half_widths: Floats
     wins: Ints
     draws: Ints
     losses: Ints
-    steps: int
 
     def expected_elo(self) -> tuple[float, float]:
         """Returns the Elo of a team that the selector chooses, and its 95 % half width.
 
-        Sum of P(team) Elo(team) over unordered teams. Where the rest is a sample, its mean, weighted by probability,
-        stands for all of it, and its scatter is in the width.
+        Sum of P(team) Elo(team) over all unordered teams. The mean of the drawn teams stands for those that are not
+        listed; how they scatter is in the width, by Student's t. NaN where too few teams were rated to know.
         """
-        if not self.probability[self.listed].sum() > 0 and not (~self.listed).any():
-            return float("nan"), float("nan")
-        weights = self.probability.copy()
-        spread = np.zeros(len(weights))
-        rest = ~self.listed
-        if rest.any() and self.probability[rest].sum() > 0:
-            left = max(0.0, 1.0 - float(self.probability[self.listed].sum()))
-            share = self.probability[rest] / self.probability[rest].sum()
-            weights[rest] = left * share
-            spread[rest] = weights[rest] * (self.elos[rest] - share @ self.elos[rest])
-        else:
-            weights /= weights.sum()
-        variance = (spread**2).sum() + ((weights * self.half_widths / Z_95) ** 2).sum()
-        return float(weights @ self.elos), float(Z_95 * np.sqrt(variance))
+        chosen = self.chosen
+        rest = 1.0 - chosen.listed_mass
+        errors = self.half_widths / Z_95
+        weights = np.where(chosen.listed, chosen.probability, 0.0)
+        quantile = Z_95
+        variance = 0.0
+        if rest > NEGLIGIBLE:
+            drawn = int(chosen.draws.sum())
+            if drawn == 0:
+                return math.nan, math.nan
+            weights += rest * chosen.draws / drawn
+            if drawn == 1:
+                return float(weights @ self.elos), math.nan
+            mean = chosen.draws @ self.elos / drawn
+            scatter = chosen.draws @ (self.elos - mean) ** 2 / (drawn - 1)  # the teams' own errors are in it
+            variance = rest**2 * scatter / drawn
+            quantile = float(student_t.ppf(0.975, drawn - 1))
+            errors = np.where(chosen.listed, errors, 0.0)
+        variance += ((weights * errors) ** 2).sum()
+        return float(weights @ self.elos), float(quantile * np.sqrt(variance))
 
     def predicted_elos(self) -> Floats:
         """Returns (K,) the Elos that the selector's probabilities speak of: 1000 + 400 log10 of P over its mean.
 
-        The mean is geometric; a team that is never chosen has minus infinity, and no part in the mean.
+        The mean is geometric, over the rated teams that are ever chosen; the others have NaN.
         """
-        with np.errstate(divide="ignore"):
-            logs = np.log(self.probability)
-        finite = np.isfinite(logs)
-        return points(logs - logs[finite].mean()) if finite.any() else np.full(len(logs), np.nan)
+        known = self.chosen.probability > 0
+        logs = np.log(self.chosen.probability, where=known, out=np.full(len(known), np.nan))
+        return points(logs - logs[known].mean()) if known.any() else logs
 
 
 def choose_teams(
-    distribution: TeamDistribution, games_per_team: int, games: int, rng: Generator
-) -> tuple[Ints, Floats, np.ndarray]:
-    """Returns the teams to rate, their probabilities, and which are there for being probable.
+    distribution: TeamDistribution,
+    drawn_by: Callable[[int], Ints],
+    games_per_team: int,
+    games: int,
+) -> Chosen:
+    """Returns the teams to rate.
 
-    All teams if ``games`` suffice for them; else half of those they suffice for are the most probable ones and the
-    others are drawn, each alike, from the rest.
+    All teams if ``games`` suffice for them; else half of those they suffice for are the most probable ones, and the
+    others are drawn by their probability from the rest.
+
+    Args:
+        distribution: over teams; where it is sampled, only the order of its listed teams is used.
+        drawn_by: returns so many teams, (count, T), as the selector would make them.
+        games_per_team: that one rating takes.
+        games: at most.
     """
     afforded = games // games_per_team
-    everyone = len(distribution.teams)
-    by_chance = np.argsort(-distribution.probability, kind="stable")
-    if afforded >= everyone:
-        chosen, likely = np.arange(everyone), everyone
-    else:
-        likely = -(-afforded // 2)
-        others = rng.choice(by_chance[likely:], size=afforded - likely, replace=False)
-        chosen = np.concatenate([by_chance[:likely], np.sort(others)])
-    return distribution.teams[chosen], distribution.probability[chosen], np.arange(len(chosen)) < likely
+    exact = distribution.samples == 0
+    if exact and afforded >= len(distribution.teams):
+        everyone = np.ones(len(distribution.teams), dtype=np.bool_)
+        return Chosen(distribution.teams, distribution.probability, everyone, np.zeros(len(everyone), np.int64), 1.0)
+    likely = np.argsort(-distribution.probability, kind="stable")[: -(-afforded // 2)]
+    top, chances_of_top = distribution.teams[likely], distribution.probability[likely]
+    if not exact:  # drawn anew: those that came often in one sample came too often
+        chances_of_top = frequencies(top, drawn_by(distribution.samples))
+    mass = float(chances_of_top.sum())
+    others = np.zeros((0, top.shape[1]), dtype=np.int64)
+    if 1.0 - mass > NEGLIGIBLE and afforded > len(likely):
+        others = rest_of(top, drawn_by, afforded - len(likely))
+    unique, draws = np.unique(others, axis=0, return_counts=True)
+    known = {tuple(team): p for team, p in zip(distribution.teams, distribution.probability, strict=True)}
+    chances = [known[tuple(team)] if exact else math.nan for team in unique]
+    return Chosen(
+        np.concatenate([top, unique]),
+        np.concatenate([chances_of_top, chances]),
+        np.arange(len(top) + len(unique)) < len(top),
+        np.concatenate([np.zeros(len(top), dtype=np.int64), draws]),
+        mass,
+    )
+
+
+def frequencies(teams: Ints, drawn: Ints) -> Floats:
+    """Returns (K,) the share of each of ``teams``, members ascending, among the ``drawn`` ones."""
+    counts = Counter(map(tuple, np.sort(drawn, axis=1)))
+    return np.array([counts[tuple(team)] for team in teams]) / len(drawn)
+
+
+def rest_of(top: Ints, drawn_by: Callable[[int], Ints], count: int) -> Ints:
+    """Returns ``count`` teams drawn by their probability from those that are not in ``top``, or fewer.
+
+    Fewer where they are so improbable that some 100,000 draws do not find enough of them.
+    """
+    listed = {tuple(team) for team in top}
+    found: list[tuple[int, ...]] = []
+    for _ in range(50):
+        drawn = np.sort(drawn_by(2000), axis=1)
+        found += [team for team in map(tuple, drawn) if team not in listed]
+        if len(found) >= count:
+            break
+    return np.array(found[:count], dtype=np.int64).reshape(-1, top.shape[1])
 
 
 def truth(
     games: Games,
     members: Policies,
-    chosen: tuple[Ints, Floats, np.ndarray],
+    chosen: Chosen,
     reference: Reference,
     games_per_pair: int,
     rng: Generator,
 ) -> Truth:
     """Returns the Elos of the ``chosen`` teams.
 
-    Every team plays every team of ``reference``, one game after the other from either side, the members of both in
-    random order.
+    Every team plays every team of ``reference``, from either side in turn, the members of both in random order.
 
     Args:
         games: the game and its threads.
@@ -113,14 +182,15 @@ def truth(
         games_per_pair: games against each of them.
         rng: orders the members and seeds the games.
     """
-    teams, probability, listed = chosen
+    teams = chosen.teams
     acting = joined([members, fixed_policies(range(len(games.env.fixed_policies)))])
     anchors = len(reference.teams)
     ours = np.repeat(teams, anchors * games_per_pair, axis=0)
     theirs = np.tile(np.repeat(reference.teams + len(members.kind), games_per_pair, axis=0), (len(teams), 1))
-    lineups = both_sides(rng.permuted(ours, axis=1), rng.permuted(theirs, axis=1))
+    each = anchors * games_per_pair
+    lineups = both_sides(rng.permuted(ours, axis=1), rng.permuted(theirs, axis=1), each)
     outcomes, _ = games.play(acting, lineups, int(rng.integers(2**63)))
-    scores = as_side_0(outcomes).scores[:, 0].reshape(len(teams), anchors, games_per_pair)
+    scores = as_side_0(outcomes, each).scores[:, 0].reshape(len(teams), anchors, games_per_pair)
     elos, half_widths = held_ratings(scores.sum(axis=2), np.full(scores.shape[:2], games_per_pair), reference.elos)
     counts = [(scores == result).sum(axis=(1, 2)) for result in (1.0, 0.5, 0.0)]
-    return Truth(teams, probability, listed, elos, half_widths, *counts, int(outcomes.steps.sum()))
+    return Truth(chosen, elos, half_widths, *counts)

@@ -15,7 +15,6 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.mlp import Singles, layers, uniform
 from berteam_cli.learner.replay import Replay, empty, remember
 from berteam_cli.learner.temporal import learn_steps, schedule
-from berteam_cli.learner.trajectories import by_member
 from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
@@ -111,7 +110,7 @@ class Dqn:
         Changes ``state``.
         """
         rngs = rng.spawn(len(state.collected))
-        trajectories = by_member(experience, first, len(state.collected))
+        trajectories = experience.trajectories(first, len(state.collected))
 
         def learn_alone(row: int) -> Learning:
             before = int(state.collected[row])

@@ -11,7 +11,6 @@ from numpy.random import Generator
 
 from berteam_cli.acting import Policies, fixed_policies
 from berteam_cli.learner.base import Learning
-from berteam_cli.learner.trajectories import by_member
 from berteam_cli.outcomes import Experience, Ints
 from berteam_cli.workers import Workers
 
@@ -48,7 +47,7 @@ class Fixed:
         self, state: Ints, experience: Experience, first: int, rng: Generator, workers: Workers
     ) -> list[Learning]:
         """Returns how many steps each member made."""
-        played = by_member(experience, first, len(state))
+        played = experience.trajectories(first, len(state))
         return [
             Learning(row, steps=sum(int(experience.lengths[game]) for game, _ in games))
             for row, games in played.items()

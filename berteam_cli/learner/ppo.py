@@ -15,7 +15,6 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.mlp import Singles, forward, layers, n_values, orthogonal, weight_count
 from berteam_cli.learner.rollout import Steps, advantages, append, empty, seen, stitched
 from berteam_cli.learner.surrogate import FIGURES, Sample, Surrogate, log_chances, one_update
-from berteam_cli.learner.trajectories import by_member
 from berteam_cli.outcomes import Experience, Ints
 from berteam_cli.workers import Workers
 
@@ -111,7 +110,7 @@ class Ppo:
         left over when a member learns. Changes ``state``.
         """
         rngs = rng.spawn(len(state.filled))
-        trajectories = by_member(experience, first, len(state.filled))
+        trajectories = experience.trajectories(first, len(state.filled))
 
         def learn_alone(row: int) -> Learning:
             return self.member_learns(state, row, self.judged(state, row, experience, trajectories[row]), rngs[row])

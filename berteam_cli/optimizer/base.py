@@ -35,11 +35,11 @@ class Replacement:
     reason: str
 
 
-Probe = Callable[[Population, Ints, Ints], Outcomes]
+Probe = Callable[[Population, Ints, Ints, int], Outcomes]
 """Plays probing games nobody learns from.
 
-Called with the population, the teams of the members (B, T), and the opposing fixed policies (B, T); returns outcomes
-with the members as side 0 in every record, half of the games played from either side of the field.
+Called with the population, the teams of the members (B, T), the opposing fixed policies (B, T), and how many games in a
+row are the same team's; returns outcomes with the members as side 0 in every record, played from either side in turn.
 """
 
 
@@ -47,6 +47,7 @@ class Optimizer(Protocol):
     """Makes a population better from its games; keeps settings only."""
 
     islands: tuple[Island, ...]
+    learns: bool  # whether ``train`` wants to know what the players saw
 
     def rate(self, population: Population, outcomes: Outcomes) -> Population:
         """Returns the population with the fitness that ``outcomes`` give."""

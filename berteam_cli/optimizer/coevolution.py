@@ -34,6 +34,7 @@ class Coevolution(Fixed):
     protect_new: int
     draw_protected: bool
 
+    learns = True
     reason = "fitness"
 
     def train(
@@ -51,7 +52,8 @@ class Coevolution(Fixed):
         """Returns the population one epoch older, after at most ``replacements`` members were replaced.
 
         The islands are visited in random order. In each, members are drawn for removal without replacement and as
-        many parents with replacement; a protected member keeps its place (paper, section on coevolution).
+        many parents with replacement; a protected member keeps its place (paper, section on coevolution). Places change
+        hands one after the other: a parent whose own place was just taken passes on what it became.
         """
         population = replace(population, **{x: getattr(population, x).copy() for x in COPIED})
         replaced: list[Replacement] = []

@@ -25,6 +25,8 @@ class Fixed:
     islands: tuple[Island, ...]
     fitness: FitnessRule
 
+    learns = False
+
     def rate(self, population: Population, outcomes: Outcomes) -> Population:
         """Returns the population with the fitness that ``outcomes`` give."""
         return replace(counted(population, outcomes), fitness=self.fitness.rated(population.fitness, outcomes))

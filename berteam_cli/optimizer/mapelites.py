@@ -53,7 +53,7 @@ class MapElites(Coevolution):
         games = len(self.opponents) * self.probe_games
         teams = np.repeat(due, games)[:, np.newaxis].repeat(self.opponents.shape[1], axis=1)
         others = np.tile(np.repeat(self.opponents, self.probe_games, axis=0), (len(due), 1))
-        measured = aggression(probe(population, teams, others)).reshape(len(due), games).mean(axis=1)
+        measured = aggression(probe(population, teams, others, games)).reshape(len(due), games).mean(axis=1)
         behaviour, stale = population.behaviour.copy(), population.stale.copy()
         behaviour[due], stale[due] = measured, False
         return replace(population, behaviour=behaviour, stale=stale)

@@ -3,7 +3,7 @@ import pytest
 
 from berteam_cli.acting import fixed_policies
 from berteam_cli.evaluation.reference import reference
-from berteam_cli.evaluation.truth import Truth, choose_teams, truth
+from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
 from tests.makers import mctf
 
@@ -12,34 +12,55 @@ def distribution(probability, members=4):
     return TeamDistribution(unordered_teams(members, 2), np.asarray(probability, dtype=float))
 
 
-def rated(probability, elos, listed=True, width=10.0):
+def drawn_by(found, seed=0):
+    rng = np.random.default_rng(seed)
+    return lambda count: rng.permuted(found.teams[rng.choice(len(found.teams), count, p=found.probability)], axis=1)
+
+
+def rated(probability, elos, listed=True, draws=0, width=10.0):
     count = len(elos)
     zeros = np.zeros(count, dtype=int)
-    return Truth(
-        *(zeros[:, np.newaxis], np.asarray(probability, dtype=float), np.broadcast_to(listed, count)),
-        *(np.asarray(elos, dtype=float), np.full(count, width), zeros, zeros, zeros, 0),
-    )
+    probability, listed = np.asarray(probability, dtype=float), np.broadcast_to(listed, count)
+    draws = np.broadcast_to(draws, count)
+    chosen = Chosen(zeros[:, np.newaxis], probability, listed, draws, float(probability[listed].sum()))
+    return Truth(chosen, np.asarray(elos, dtype=float), np.full(count, width), zeros, zeros, zeros)
 
 
 def test_all_teams_are_rated_if_there_are_games_for_them():
-    teams, probability, listed = choose_teams(distribution(np.full(10, 0.1)), 56, 560, np.random.default_rng(0))
-    np.testing.assert_array_equal(teams, unordered_teams(4, 2))
-    np.testing.assert_array_equal(probability, 0.1)
-    assert listed.all()
+    found = distribution(np.full(10, 0.1))
+    chosen = choose_teams(found, drawn_by(found), 56, 560)
+    np.testing.assert_array_equal(chosen.teams, unordered_teams(4, 2))
+    np.testing.assert_array_equal(chosen.probability, 0.1)
+    assert chosen.listed.all()
+    assert chosen.listed_mass == 1
 
 
-def test_else_half_are_the_most_probable_and_half_a_sample_of_the_rest():
+def test_else_half_are_the_most_probable_and_the_others_are_drawn_from_the_rest():
     chances = np.arange(10) / 45
-    seen = set()
-    for seed in range(200):
-        teams, probability, listed = choose_teams(distribution(chances), 56, 5 * 56 + 55, np.random.default_rng(seed))
-        assert len(teams) == 5
-        np.testing.assert_array_equal(listed, [True, True, True, False, False])
-        np.testing.assert_array_equal(probability[:3], chances[[9, 8, 7]])
-        assert (probability[3:] < chances[7]).all()
-        assert len({tuple(t) for t in teams}) == 5
-        seen |= {tuple(t) for t in teams[3:]}
-    assert len(seen) == 7
+    found = distribution(chances)
+    counts = np.zeros(10)
+    for seed in range(500):
+        chosen = choose_teams(found, drawn_by(found, seed), 56, 5 * 56 + 55)
+        listed = chosen.listed
+        np.testing.assert_array_equal(chosen.probability[listed], chances[[9, 8, 7]])
+        assert chosen.listed_mass == pytest.approx(24 / 45)
+        assert chosen.draws.sum() == 2
+        assert not chosen.draws[listed].any()
+        assert len({tuple(t) for t in chosen.teams}) == len(chosen)
+        for team, draws in zip(chosen.teams, chosen.draws, strict=True):
+            counts[(found.teams == team).all(axis=1)] += draws
+    np.testing.assert_allclose(counts / 1000, [*chances[:7] / chances[:7].sum(), 0, 0, 0], atol=0.05)
+
+
+def test_a_sampled_distribution_is_drawn_anew():
+    """The most frequent of a sample came too often in it; their chances are taken from other draws."""
+    flat = distribution(np.full(10, 0.1))
+    lucky = TeamDistribution(flat.teams[:4], np.array([0.3, 0.2, 0.1, 0.1]), other=0.3, samples=20_000)
+    chosen = choose_teams(lucky, drawn_by(flat), 56, 560)
+    assert chosen.listed.sum() == 4
+    np.testing.assert_allclose(chosen.probability[chosen.listed], 0.1, atol=0.01)
+    assert np.isnan(chosen.probability[~chosen.listed]).all()
+    assert chosen.draws.sum() == 6  # ten are afforded, four of them for the most frequent that are known
 
 
 def test_expected_elo_by_hand():
@@ -49,18 +70,41 @@ def test_expected_elo_by_hand():
 
 
 def test_a_sample_stands_for_the_rest():
-    # Half the mass is listed; of the other half two teams were drawn, one twice as likely.
-    truths = rated([0.5, 0.02, 0.01], [1300, 1000, 700], [True, False, False], width=0.0)
+    # Half the mass is listed; from the other half three draws hit two teams, one of them twice.
+    truths = rated([0.5, 0.02, 0.01], [1300, 1000, 700], [True, False, False], [0, 2, 1], width=0.0)
     expected, width = truths.expected_elo()
-    assert expected == pytest.approx(0.5 * 1300 + 0.5 * (1000 * 2 + 700) / 3)
-    spread = 0.5 * np.sqrt((2 / 3 * 100) ** 2 + (1 / 3 * 200) ** 2)
-    assert width == pytest.approx(1.959964 * spread)
+    assert expected == pytest.approx(0.5 * 1300 + 0.5 * 900)
+    scatter = (2 * 100**2 + 200**2) / 2
+    assert width == pytest.approx(4.302653 * 0.5 * np.sqrt(scatter / 3))  # Student's t with 2 degrees
+
+
+def test_too_few_draws_tell_no_interval():
+    one = rated([0.5, 0.02], [1300, 1000], [True, False], [0, 1])
+    assert one.expected_elo()[0] == pytest.approx(1150)
+    assert np.isnan(one.expected_elo()[1])
+    assert np.isnan(rated([0.5], [1300]).expected_elo()).all()
+
+
+def test_the_interval_of_the_expected_elo_covers_it():
+    """Of 300 evaluations of a few of 78 teams, about 95 % have the truth within their interval."""
+    rng = np.random.default_rng(5)
+    found = distribution(rng.dirichlet(np.ones(78) * 0.5), members=12)
+    elos = rng.normal(1000, 150, size=78)
+    by_team = {tuple(t): e for t, e in zip(found.teams, elos, strict=True)}
+    covered = 0
+    for seed in range(300):
+        chosen = choose_teams(found, drawn_by(found, seed), 1, 16)
+        zeros = np.zeros(len(chosen), dtype=int)
+        known = np.array([by_team[tuple(t)] for t in chosen.teams])
+        mean, width = Truth(chosen, known, np.zeros(len(chosen)), zeros, zeros, zeros).expected_elo()
+        covered += abs(mean - found.probability @ elos) <= width
+    assert 0.90 <= covered / 300 <= 1
 
 
 def test_predicted_elo_by_hand():
     predicted = rated([0.5, 0.05, 0.005, 0.0], [1, 2, 3, 4]).predicted_elos()
     np.testing.assert_allclose(predicted[:3], [1400, 1000, 600])
-    assert predicted[3] == -np.inf
+    assert np.isnan(predicted[3])
 
 
 def test_the_fixed_teams_get_their_own_elos_back():
@@ -69,7 +113,7 @@ def test_the_fixed_teams_get_their_own_elos_back():
     known = reference(games, 28)
     assert known.source.startswith("shipped table")
     assert known.elos.mean() == pytest.approx(1000)
-    chosen = (known.teams, np.full(28, 1 / 28), np.ones(28, dtype=bool))
+    chosen = Chosen(known.teams, np.full(28, 1 / 28), np.ones(28, dtype=bool), np.zeros(28, dtype=int), 1.0)
     found = truth(games, fixed_policies(range(7)), chosen, known, 2, np.random.default_rng(0))
     assert (np.abs(found.elos - known.elos) < found.half_widths).all()
     assert (found.wins + found.draws + found.losses == 56).all()

@@ -65,7 +65,8 @@ def test_projection_measures_those_who_played_where_somebody_is_old_enough():
     people.stale[:] = [True, False, True, True]
     asked = []
 
-    def probe(population, teams, others):
+    def probe(population, teams, others, each):
+        assert each == 6
         asked.append((teams, others))
         events = np.zeros((len(teams), 2, 4))
         events[:, 0, 0] = others[:, 0]  # one capture if the opponents' first is policy 1

@@ -1,0 +1,40 @@
+"""How long a run will take."""
+
+from __future__ import annotations
+
+import logging
+import time
+
+log = logging.getLogger("berteam")
+
+
+class Pace:
+    """Tells how long the run will take, first after a few epochs and then now and then."""
+
+    def __init__(self, done: int, epochs: int) -> None:
+        """Starts with ``done`` of ``epochs`` epochs behind."""
+        self.begun = self.told = time.monotonic()
+        self.first, self.next, self.epochs = done, min(done + 3, epochs), epochs
+
+    def tell(self, done: int, games: int) -> None:
+        """Logs the time left after ``done`` epochs of ``games`` games each, at most every ten seconds."""
+        at = time.monotonic()
+        if done < self.epochs and (done < self.next or (done > self.next and at - self.told < 10)):
+            return
+        each = (at - self.begun) / (done - self.first)
+        left = each * (self.epochs - done)
+        if done == self.next < self.epochs:
+            log.info(
+                "%d epochs of %d games: about %s (%.2f s an epoch so far).",
+                *(self.epochs, games, spoken(left), each),
+            )
+        else:
+            log.info("epoch %d of %d, %.2f s each, %s left", done, self.epochs, each, spoken(left))
+        self.told = at
+
+
+def spoken(seconds: float) -> str:
+    """Returns a time as it is read: 40 s, 12 min, 3.4 h."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,89 @@
+"""The config that a run folder holds."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import yaml
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from berteam_cli.config import SCHEMAS, IslandConfig, TrainConfig
+from berteam_cli.errors import InputError
+from berteam_cli.folder import CONFIG
+
+MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation")
+"""Keys whose values may differ from those a run began with: they change nothing that is done already."""
+PLACE = ("out", "on_exists")
+"""Keys that say where a run goes, not what it does."""
+
+
+def write_config(folder: Path, text: str) -> None:
+    """Writes the config ``text``; there is never half of it."""
+    part = (folder / CONFIG).with_suffix(".part")
+    part.write_text(text, encoding="utf-8")
+    os.replace(part, folder / CONFIG)
+
+
+def plain_config(folder: Path) -> DictConfig:
+    """Returns the config of the run in ``folder`` as it stands there.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        config = OmegaConf.load(folder / CONFIG)
+    except (OSError, ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
+        raise InputError(f"{folder / CONFIG} cannot be read: {str(error).splitlines()[0]}.") from error
+    if not isinstance(config, DictConfig):
+        raise InputError(f"{folder / CONFIG} cannot be read: it holds no keys.")
+    return config
+
+
+def stored_config(folder: Path) -> DictConfig:
+    """Returns the config of the training run in ``folder``, with its schemas.
+
+    Raises:
+        InputError: it cannot be read, or is not a training's.
+    """
+    plain = plain_config(folder)
+    try:
+        typed = OmegaConf.structured(TrainConfig)
+        for group in ("env", "selector", "optimizer", "learner"):
+            typed[group] = OmegaConf.structured(SCHEMAS[group][plain[group].name])
+        typed.evaluation = OmegaConf.structured(SCHEMAS["evaluation"]["truth"])
+        typed.population = OmegaConf.structured(SCHEMAS["population"]["islands"])
+        typed.population.islands = {}
+        for name, island in plain.population.islands.items():
+            typed.population.islands[name] = OmegaConf.structured(IslandConfig)
+            typed.population.islands[name].learner = OmegaConf.structured(SCHEMAS["learner"][island.learner.name])
+        return OmegaConf.merge(typed, plain)
+    except (OmegaConfBaseException, AttributeError, KeyError, TypeError) as error:
+        said = str(error).splitlines()[0]
+        raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
+
+
+def check_same(folder: Path, text: str) -> None:
+    """Checks that the config ``text`` can go on with the run in ``folder``.
+
+    Raises:
+        InputError: a key that may not change has another value.
+    """
+    old, new = flat(OmegaConf.to_container(plain_config(folder))), flat(OmegaConf.to_container(OmegaConf.create(text)))
+    for key in sorted(old.keys() | new.keys()):
+        if key.split(".", maxsplit=1)[0] not in MAY_CHANGE + PLACE and old.get(key) != new.get(key):
+            raise InputError(
+                f"{key} is {new.get(key)!r}, but the run in {folder} was begun with {old.get(key)!r}; "
+                f"it can only go on with the same."
+            )
+
+
+def flat(config: Any, prefix: str = "") -> dict[str, Any]:
+    """Returns the values of nested dictionaries by dotted key; lists are values."""
+    values: dict[str, Any] = {}
+    for key, value in config.items():
+        path = f"{prefix}{key}"
+        values |= flat(value, f"{path}.") if isinstance(value, dict) else {path: value}
+    return values
