@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from berteam_cli.acting import fixed_policies, joined
-from berteam_cli.games import as_side_0, both_sides, pairings, seeds_of
+from berteam_cli.games import as_side_0, both_sides, in_turn, pairings, seeds_of
 from tests.makers import SHORT, mctf, random_networks
 
 
@@ -93,6 +93,10 @@ def test_scores_are_captures_and_sides_are_told_apart():
         assert outcomes.event("captures")[0, winner] == 1
         assert outcomes.event("grabs")[0, winner] >= 1
         np.testing.assert_array_equal(outcomes.winners, [[2, 2]])
+
+
+def test_sides_are_taken_in_turn_anew_for_every_team():
+    np.testing.assert_array_equal(in_turn(6, 3), [False, True, False] * 2)
 
 
 def test_both_sides_and_back():
