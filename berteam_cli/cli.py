@@ -81,12 +81,15 @@ def composed(word: str, words: list[str]) -> None:
     """Runs a command whose config Hydra composes."""
     import hydra  # noqa: PLC0415 (start-up: each command imports what it needs)
 
-    from berteam_cli.compose import arguments, check, prepare  # noqa: PLC0415
+    from berteam_cli.compose import arguments, check, help_text, prepare  # noqa: PLC0415
 
     prepare()
     Sweeps.failed, Sweeps.table = 0, None
     given = arguments(words)
-    if not (given.help or given.hydra_help or given.shell_completion):
+    if given.help:
+        print(help_text(word))
+        return
+    if not (given.hydra_help or given.shell_completion):
         check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
     sys.argv = [f"berteam {word}", *words]
     task = {"train": train_task, "tournament": tournament_task}[word]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.resources
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import yaml
 from hydra import compose, initialize_config_module
 from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
@@ -17,7 +19,6 @@ from omegaconf.errors import OmegaConfBaseException
 
 from berteam_cli.config import checked, one_line, register
 from berteam_cli.errors import InputError, did_you_mean
-from berteam_cli.folder import MANIFEST
 
 CONF = "berteam_cli.conf"
 HIDDEN = ("schema", "hydra")  # groups no user chooses from
@@ -81,6 +82,8 @@ def check_sweep_folder(overrides: list[Override]) -> None:
     Raises:
         InputError: it does.
     """
+    from berteam_cli.folder import MANIFEST  # noqa: PLC0415 (it brings torch, which --help does not need)
+
     for override in overrides:
         if override.key_or_group == "hydra.sweep.dir":
             folder = Path(str(override.value()))
@@ -195,6 +198,14 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
 def groups() -> list[str]:
     """Returns the config groups a user chooses from."""
     return [x for x in sorted(GlobalHydra.instance().config_loader().list_groups("")) if x not in HIDDEN]
+
+
+def help_text(command: str) -> str:
+    """Returns what ``--help`` prints: the template in the command's yaml, with the choices of each group."""
+    text = importlib.resources.files(CONF).joinpath(f"{command}.yaml").read_text(encoding="utf-8")
+    with initialize_config_module(CONF, version_base="1.3", job_name=command):
+        lines = [f"  {group}: {', '.join(choices(group))}" for group in groups()]
+    return str(yaml.safe_load(text)["hydra"]["help"]["template"]).replace("$APP_CONFIG_GROUPS", "\n".join(lines))
 
 
 def check_keys(command: str, searched: list[str], overrides: list[Override]) -> None:

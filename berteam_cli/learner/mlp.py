@@ -20,8 +20,6 @@ Singles = npt.NDArray[np.float32]
 
 # Sums may be reordered to fill vector registers, in one way for each machine; NaN and infinity stay what they are.
 FAST = {"reassoc", "contract", "nsz"}
-# Numba's cache looks at the file of the function that was called only: whoever changes this module deletes
-# __pycache__/*.nb* before trusting a test of the modules that call it.
 compiled = njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 
 

@@ -192,7 +192,8 @@ def test_sampled_distribution_says_so(berteam, tmp_path):
 def test_flags_of_hydra(berteam, tmp_path):
     assert "learning_rate" in berteam("train", "selector=mcaa", "--cfg", "job").stdout
     helped = berteam("train", "--help").stdout
-    assert "selector: berteam, mcaa, uniform" in helped
+    assert "  selector: berteam, mcaa, uniform\n" in helped
+    assert "schema" not in helped
     assert "berteam train selector=mcaa optimizer=mapelites" in helped
     assert list(tmp_path.iterdir()) == []
     assert berteam("--version").stdout.strip()
