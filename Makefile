@@ -38,7 +38,7 @@ picture: setup ## the picture of the README, from a run of the paper's first exp
 	$(BIN)/python docs/picture.py outputs/picture docs/picture.png
 
 reference: setup ## the Elos of the fixed teams that the package ships
-	$(BIN)/berteam tournament games_per_pair=40 out=outputs/reference on_exists=overwrite
+	$(BIN)/berteam tournament out=outputs/reference on_exists=overwrite
 	cp outputs/reference/elo.csv berteam_cli/rating/$$($(BIN)/python -c 'import json; print(json.load(open("outputs/reference/manifest.json"))["reference"])')
 
 clean: ## removes the environment and what tests leave; run folders stay

@@ -134,8 +134,8 @@ def check_learner(config: DictConfig, overrides: list[Override]) -> None:
     if said and not any(OmegaConf.is_interpolation(island, "learner") for island in islands.values()):
         name = next(iter(islands))
         raise InputError(
-            f"{said[0]} has no effect: learner.* not used by this population, whose islands bring their own; "
-            f"say population.islands.{name}.learner.KEY=VALUE instead."
+            f"{said[0]} has no effect with this population, whose islands bring learners of their own; "
+            f"say population.islands.{name}.learner.KEY=VALUE instead, or choose a population such as ppo50."
         )
 
 

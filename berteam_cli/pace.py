@@ -8,26 +8,29 @@ import time
 log = logging.getLogger("berteam")
 
 
+WARM_UP = 2  # epochs that may compile something, and tell nothing of the others
+FIRST_WORD = 4  # epochs until the first estimate
+
+
 class Pace:
     """Tells how long the run will take, first after a few epochs and then now and then."""
 
     def __init__(self, done: int, epochs: int) -> None:
         """Starts with ``done`` of ``epochs`` epochs behind."""
+        self.done, self.epochs = done, epochs
         self.begun = self.told = time.monotonic()
-        self.first, self.next, self.epochs = done, min(done + 3, epochs), epochs
 
     def tell(self, done: int, games: int) -> None:
         """Logs the time left after ``done`` epochs of ``games`` games each, at most every ten seconds."""
-        at = time.monotonic()
-        if done < self.epochs and (done < self.next or (done > self.next and at - self.told < 10)):
+        at, behind = time.monotonic(), done - self.done
+        if behind == WARM_UP:
+            self.begun = at
+        if behind < FIRST_WORD or (behind > FIRST_WORD and done < self.epochs and at - self.told < 10):
             return
-        each = (at - self.begun) / (done - self.first)
+        each = (at - self.begun) / (behind - WARM_UP)
         left = each * (self.epochs - done)
-        if done == self.next < self.epochs:
-            log.info(
-                "%d epochs of %d games: about %s (%.2f s an epoch so far).",
-                *(self.epochs, games, spoken(left), each),
-            )
+        if behind == FIRST_WORD and done < self.epochs:
+            log.info("%d epochs of %d games: about %s (%.2f s an epoch).", self.epochs, games, spoken(left), each)
         else:
             log.info("epoch %d of %d, %.2f s each, %s left", done, self.epochs, each, spoken(left))
         self.told = at

@@ -38,14 +38,18 @@ def show(folder: Path, top: int) -> None:
     """Prints what came of the run in ``folder``: figures, strongest teams, most probable teams, members.
 
     Args:
-        folder: of a run.
+        folder: of a run, or of a sweep, whose table is printed.
         top: rows of each table.
 
     Raises:
         InputError: there is no run, or a table cannot be read.
     """
-    manifest = read_manifest(folder)
     console = Console(width=None if Console().is_terminal else 120)
+    if (folder / "sweep.csv").exists():
+        shown = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
+        console.print(printed(f"Sweep {folder}", pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[shown]))
+        return
+    manifest = read_manifest(folder)
     console.print(f"{folder}: {manifest['status']}, started {manifest['started']}", highlight=False)
     tables = {name: read_table(folder, name) for name in ("summary", "elo", "team_distribution", "agents", "pairs")}
     summary, elo, teams, agents = (tables[x] for x in ("summary", "elo", "team_distribution", "agents"))

@@ -59,7 +59,11 @@ class MapElites(Coevolution):
         return replace(population, behaviour=behaviour, stale=stale)
 
     def removable(self, population: Population, island: Island) -> tuple[Ints, Floats]:
-        """Returns (K,) crowded members of ``island``, and (K,) their chances to be drawn for removal."""
+        """Returns (K,) members of ``island`` that may be drawn for removal, and (K,) their chances.
+
+        Crowded is who has anybody of the island nearer than the radius, elites included; fitness is compared with the
+        mean of those who may be drawn.
+        """
         if not (population.age[island.members] > self.protect_new).any():
             return np.zeros(0, dtype=np.int64), empty()
         unsafe = island.first + np.flatnonzero(crowded(population.behaviour[island.members], self.radius))

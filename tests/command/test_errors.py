@@ -32,7 +32,7 @@ CASES = {
     ("train", "population.islands.ppo64.size=-2"): "population.islands.ppo64.size must be >= 1",
     ("train", "population=fixed_policies", "population.islands.random.size=2"): "islands.random.size must be 1",
     ("train", "population=ppo6", "learner.network=[]"): "learner.network must be 1 to 6 widths",
-    ("train", "learner.network=[8]"): "learner.* not used",
+    ("train", "learner.network=[8]"): "learner.network has no effect with this population",
     ("train", "env=rps", "population=fixed_policies"): "policies.*env=rps.*rock",
     ("train", "env=rps", "population=ppo6", "optimizer=mapelites"): "optimizer.opponents.*rock",
     ("train", "selector=mcaa", "optimizer.fitness=elo"): "selector=mcaa has none",

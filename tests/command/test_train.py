@@ -255,6 +255,7 @@ def test_a_sweep_does_not_take_another_ones_runs_for_its_own(berteam, tmp_path):
     table = pd.read_csv(tmp_path / "sweep" / "sweep.csv")
     assert list(table.games) == [32, 48]
     assert "seed=1" in table.overrides[1]
+    assert "seed=1" in berteam("inspect", "sweep").stdout
 
 
 def test_a_job_that_fails_does_not_end_the_sweep(berteam, tmp_path, monkeypatch):
