@@ -6,13 +6,11 @@ Exit codes: 0 done, 2 the input is wrong, 3 the run failed, 130 interrupted.
 from __future__ import annotations
 
 import argparse
-import logging
-import math
 import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from berteam_cli import __version__
 from berteam_cli.errors import InputError, RunError, did_you_mean
@@ -20,7 +18,7 @@ from berteam_cli.errors import InputError, RunError, did_you_mean
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-WRONG, FAILED, INTERRUPTED = 2, 3, 130
+INTERRUPTED = 130
 
 WORDS = {
     "train": "one run: selector x optimizer x env; -m sweeps",
@@ -52,12 +50,8 @@ def main() -> None:
         sys.exit(0)
     try:
         run(words[0], words[1:])
-    except InputError as error:
-        print(f"berteam: {error}", file=sys.stderr)
-        sys.exit(WRONG)
-    except RunError as error:
-        print(f"berteam: {error}", file=sys.stderr)
-        sys.exit(FAILED)
+    except (InputError, RunError) as error:
+        refuse(error)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
     except BrokenPipeError:  # whoever read our output has seen enough, as head does
@@ -93,10 +87,7 @@ def composed(word: str, words: list[str]) -> None:
         check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
     sys.argv = [f"berteam {word}", *words]
     task = {"train": train_task, "tournament": tournament_task}[word]
-    try:
-        hydra.main(version_base="1.3", config_path="pkg://berteam_cli.conf", config_name=word)(task)()
-    finally:
-        logging.getLogger("berteam").handlers = []
+    hydra.main(version_base="1.3", config_path="pkg://berteam_cli.conf", config_name=word)(task)()
     if given.multirun and Sweeps.failed:
         raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
 
@@ -125,59 +116,47 @@ class Sweeps:
 
 def train_task(cfg: DictConfig) -> float:
     """Trains; what Hydra calls for each run. Returns the expected Elo, for sweepers that look for the best."""
-    from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
-    from hydra.types import RunMode  # noqa: PLC0415
-    from omegaconf import OmegaConf  # noqa: PLC0415
-
     from berteam_cli.command.train import train  # noqa: PLC0415
-    from berteam_cli.config import checked  # noqa: PLC0415
 
-    text = OmegaConf.to_yaml(cfg, resolve=True)
-    if HydraConfig.get().mode != RunMode.MULTIRUN:
-        config = checked(cfg)
-        return outside(lambda: train(config, text, Path(config.out) if config.out else None))
-    return job(lambda folder: train(checked(cfg), text, folder))
-
-
-def job(task: Callable[[Path], float]) -> float:
-    """Runs ``task`` as one job of a sweep, in the job's folder; returns what it returns, NaN if it failed."""
-    from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
-
-    from berteam_cli.command.sweep import TABLE, swept  # noqa: PLC0415
-
-    folder = Path(HydraConfig.get().runtime.output_dir)
-    Sweeps.table = folder.parent / TABLE
-    figure, ok = swept(lambda: task(folder), folder, list(HydraConfig.get().overrides.task))
-    Sweeps.failed += not ok
-    return figure
+    return perform(train, cfg)
 
 
 def tournament_task(cfg: DictConfig) -> float:
     """Plays a tournament; what Hydra calls. Returns NaN: a tournament has no figure to look for the best of."""
+    from berteam_cli.command.tournament import play  # noqa: PLC0415
+
+    return perform(play, cfg)
+
+
+def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) -> float:
+    """Runs ``command`` with the config, its yaml and its folder, as the job of a sweep if it is one.
+
+    Returns what the command returns; NaN for a job that failed.
+    """
     from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
     from hydra.types import RunMode  # noqa: PLC0415
     from omegaconf import OmegaConf  # noqa: PLC0415
 
-    from berteam_cli.command.tournament import play  # noqa: PLC0415
+    from berteam_cli.command.sweep import TABLE, swept  # noqa: PLC0415
     from berteam_cli.config import checked  # noqa: PLC0415
 
     config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
     if HydraConfig.get().mode != RunMode.MULTIRUN:
-        outside(lambda: play(config, text, Path(config.out) if config.out else None))
-        return math.nan
-    return job(lambda folder: play(config, text, folder) or math.nan)
+        try:
+            return command(config, text, Path(config.out) if config.out else None)
+        except (InputError, RunError) as error:  # past Hydra, which would print a traceback
+            refuse(error)
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    Sweeps.table = folder.parent / TABLE
+    figure, ok = swept(lambda: command(config, text, folder), folder, list(HydraConfig.get().overrides.task))
+    Sweeps.failed += not ok
+    return figure
 
 
-def outside(task: Any) -> Any:
-    """Returns what ``task`` returns, and takes its errors past Hydra, which would print a traceback of them."""
-    try:
-        return task()
-    except InputError as error:
-        print(f"berteam: {error}", file=sys.stderr)
-        raise SystemExit(WRONG) from None
-    except RunError as error:
-        print(f"berteam: {error}", file=sys.stderr)
-        raise SystemExit(FAILED) from None
+def refuse(error: InputError | RunError) -> NoReturn:
+    """Says what is wrong and exits with the error's code."""
+    print(f"berteam: {error}", file=sys.stderr)
+    raise SystemExit(error.code) from None
 
 
 def reader(word: str, words: list[str], **arguments: dict[str, Any]) -> argparse.Namespace:
@@ -188,10 +167,10 @@ def reader(word: str, words: list[str], **arguments: dict[str, Any]) -> argparse
     """
     parser = argparse.ArgumentParser(prog=f"berteam {word}", description=WORDS[word])
 
-    def refuse(message: str) -> None:
+    def wrong(message: str) -> None:
         raise InputError(f"berteam {word}: {message}; see berteam {word} --help.")
 
-    parser.error = refuse  # type: ignore[assignment,method-assign]
+    parser.error = wrong  # type: ignore[assignment,method-assign]
     for name, settings in arguments.items():
         parser.add_argument(name.replace("__", "--"), **settings)
     return parser.parse_args(words)

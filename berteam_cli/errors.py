@@ -9,6 +9,8 @@ from difflib import get_close_matches
 class InputError(Exception):
     """What the user gave is wrong; the message says what was given, what is allowed, and the nearest right thing."""
 
+    code = 2  # what the command exits with
+
     @classmethod
     def choice(cls, key: str, given: str, allowed: Iterable[str]) -> InputError:
         """Returns the error for ``given`` where ``key`` takes one of ``allowed``."""
@@ -18,6 +20,8 @@ class InputError(Exception):
 
 class RunError(Exception):
     """The run cannot go on through no fault of the input; the message says what to do."""
+
+    code = 3
 
 
 def did_you_mean(given: str, allowed: Iterable[str]) -> str:

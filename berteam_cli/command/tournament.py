@@ -34,8 +34,8 @@ log = logging.getLogger("berteam")
 MOST_GAMES = 1_000_000  # some hours
 
 
-def play(config: TournamentConfig, text: str, folder: Path | None = None) -> None:
-    """Plays as configured and writes elo.csv, pairs.csv and games.csv.
+def play(config: TournamentConfig, text: str, folder: Path | None = None) -> float:
+    """Plays as configured and writes elo.csv, pairs.csv and games.csv; returns NaN, having no figure of its own.
 
     Args:
         config: checked.
@@ -63,6 +63,7 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> Non
             write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
             write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
     show(folder, 10)
+    return math.nan
 
 
 @dataclass(frozen=True)

@@ -62,10 +62,13 @@ def test_silent_where_it_cannot_write(package):
     folder = package / "__pycache__"
     (package / "rule.py").write_text("x = 2\n")
     folder.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    before = sorted(path.name for path in folder.iterdir())
     forget_stale(package)
     folder.chmod(stat.S_IRWXU)
+    assert sorted(path.name for path in folder.iterdir()) == before
 
 
 def test_silent_where_there_is_nothing(tmp_path):
     (tmp_path / "__pycache__").write_text("a file")
     forget_stale(tmp_path)
+    assert (tmp_path / "__pycache__").read_text() == "a file"
