@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from mctf.compiled import part
-from mctf.rules import BLUE, Rules
+from mctf.rules import BLUE, RED, Rules
 
 
 @part
@@ -57,12 +57,30 @@ def apart(x1: float, y1: float, x2: float, y2: float) -> float:
 
 
 @part
-def home_x(team: int, rules: Rules) -> float:
-    """Returns x in m of the home of the team's flag; its y is the middle of the field."""
-    return 7.0 * rules.width_m / 8.0 if team == BLUE else rules.width_m / 8.0
+def team_of(v: int, rules: Rules) -> int:
+    """Returns the team of a vehicle."""
+    return BLUE if v < rules.blue_size else RED
+
+
+@part
+def vehicles_of(team: int, rules: Rules) -> tuple[int, int]:
+    """Returns the team's first vehicle and the one behind its last."""
+    return (0, rules.blue_size) if team == BLUE else (rules.blue_size, rules.blue_size + rules.red_size)
+
+
+@part
+def home(team: int, rules: Rules) -> tuple[float, float]:
+    """Returns x and y in m of the home of the team's flag."""
+    return rules.blue_home_m if team == BLUE else rules.red_home_m
+
+
+@part
+def is_right(team: int, rules: Rules) -> bool:
+    """Returns whether the team has the right half of the field."""
+    return rules.blue_right == (team == BLUE)
 
 
 @part
 def own_side(team: int, x: float, rules: Rules) -> bool:
     """Returns whether ``x`` is on the team's half; the line between belongs to both."""
-    return x >= rules.width_m / 2.0 if team == BLUE else x <= rules.width_m / 2.0
+    return x >= rules.width_m / 2.0 if is_right(team, rules) else x <= rules.width_m / 2.0

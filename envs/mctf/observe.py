@@ -1,4 +1,4 @@
-"""What one vehicle sees: 13 + 16 n numbers, relative to itself, the same for both sides by symmetry.
+"""What a vehicle sees: O = 13 + 8 V numbers, V vehicles of both teams; relative to it, and so alike for both sides.
 
 | index | what |
 |---|---|
@@ -14,10 +14,11 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mctf.compiled import kernel, part
-from mctf.geometry import bearing_of, heading_of, home_x, length32, turned
-from mctf.rules import BLUE, Rules
+from mctf.geometry import heading_of, home, is_right, length32, team_of, turned, vehicles_of
+from mctf.rules import Rules
 from mctf.state import CAPTURES, State
 
 OWN = 21
@@ -25,36 +26,84 @@ OWN = 21
 OTHER = 8
 """Numbers for each other vehicle: bearing, distance, its heading relative to the way from it to me
 (0: it points at me), speed, has flag, is on its own side, cooldown, is tagged."""
+FLAT = 1e-5
+"""Slope up to which an angle is its tangent, to the last bit of a heading in deg."""
 
 
-def observation_size(team_size: int) -> int:
-    """Returns the length of an observation in games of ``team_size`` a side."""
-    return OWN + OTHER * (2 * team_size - 1)
+def observation_size(rules: Rules) -> int:
+    """Returns O, the length of an observation."""
+    return OWN + OTHER * (rules.blue_size + rules.red_size - 1)
 
 
-@part
-def see(x: float, y: float, heading: float, to_x: float, to_y: float, out: np.ndarray, at: int) -> None:
-    """Writes bearing in deg and distance in m from (x, y) to a point to ``out[at]`` and ``out[at + 1]``.
-
-    All coordinates are single-precision numbers, and so is their difference.
-    """
-    dx, dy = np.float64(np.float32(to_x - x)), np.float64(np.float32(to_y - y))
-    out[at] = bearing_of(dx, dy, heading)
-    out[at + 1] = length32(dx, dy)
-
-
-@part
-def nearest(at: float, start: float, end: float) -> float:
-    """Returns the coordinate in m of the point of a wall that is nearest to a vehicle.
-
-    It is multiplied and divided by the wall's length as in the original, which walks along the walls
-    clockwise: the rounding decides the bearing of a wall that is centimetres away.
+@kernel
+def observe(state: State, b: int, rules: Rules, raw_out: np.ndarray) -> None:
+    """Writes what every vehicle of game ``b`` sees, in degrees, metres, m/s and seconds.
 
     Args:
-        at: m, the vehicle's coordinate along the wall; single precision as the other two.
+        state: not changed.
+        b: game.
+        rules: the game's constants.
+        raw_out: (V, O) float64, overwritten; the fixed policies read it.
+    """
+    for v in range(rules.blue_size + rules.red_size):
+        see_field(state, b, v, rules, raw_out[v])
+        team = team_of(v, rules)
+        raw_out[v, 14] = state.speed[b, v]
+        raw_out[v, 15] = state.has_flag[b, v]
+        raw_out[v, 16] = state.on_own_side[b, v]
+        raw_out[v, 17] = state.cooldown[b, v]
+        raw_out[v, 18] = state.is_tagged[b, v]
+        raw_out[v, 19] = state.score[b, team, CAPTURES]
+        raw_out[v, 20] = state.score[b, 1 - team, CAPTURES]
+        for other in range(v):
+            see_each_other(state, b, v, other, rules, raw_out)
+
+
+@part
+def rounded(value: float, rules: Rules) -> float:
+    """Returns ``value``, in single precision if the rules say so."""
+    return np.float64(np.float32(value)) if rules.float32 else value
+
+
+@part
+def see_field(state: State, b: int, v: int, rules: Rules, out: np.ndarray) -> None:
+    """Writes the first 14 numbers of vehicle ``v``: bearings in deg and distances in m of homes, walls, middle line.
+
+    For the team on the right walls 0 to 3 are top, right, bottom, left; for the other half a circle further.
+    """
+    team = team_of(v, rules)
+    heading = state.heading[b, v]
+    x, y = rounded(state.pos[b, v, 0], rules), rounded(state.pos[b, v, 1], rules)
+    width, height = rounded(rules.width_m, rules), rounded(rules.height_m, rules)
+    for at, side in ((0, 1 - team), (2, team)):
+        home_x, home_y = home(side, rules)
+        dx, dy = home_x - x, home_y - y  # double precision in all versions
+        out[at] = turned(heading_of(dx, dy) - heading)
+        out[at + 1] = math.sqrt(dx * dx + dy * dy)
+    top, right = (4, 6) if is_right(team, rules) else (8, 10)
+    bottom, left = 12 - top, 16 - right
+    look_up_or_down(x, y, nearest(x, 0.0, width, rules), height, heading, rules, out, top)
+    look_aside(x, y, width, nearest(y, height, 0.0, rules), heading, rules, out, right)
+    look_up_or_down(x, y, nearest(x, width, 0.0, rules), 0.0, heading, rules, out, bottom)
+    look_aside(x, y, 0.0, nearest(y, 0.0, height, rules), heading, rules, out, left)
+    look_aside(x, y, width / 2.0, nearest(y, 0.0, height, rules), heading, rules, out, 12)
+
+
+@part
+def nearest(at: float, start: float, end: float, rules: Rules) -> float:
+    """Returns the coordinate in m of the point of a wall that is nearest to a vehicle.
+
+    In single precision it is multiplied and divided by the wall's length as in the original, which walks along the
+    walls clockwise: the rounding decides the bearing of a wall that is centimetres away.
+
+    Args:
+        at: m, the vehicle's coordinate along the wall; rounded as the other two.
         start: m, where the wall starts.
         end: m, where it ends.
+        rules: the game's constants.
     """
+    if not rules.float32:
+        return min(max(at, min(start, end)), max(start, end))
     ahead = 1.0 if end > start else -1.0
     along, length = np.float32(ahead * (at - start)), np.float32(ahead * (end - start))
     if along <= 0.0:
@@ -64,103 +113,131 @@ def nearest(at: float, start: float, end: float) -> float:
     return np.float64(np.float32(start + ahead * np.float64(along * length / length)))
 
 
-@kernel
-def observe(state: State, b: int, v: int, rules: Rules, raw_out: np.ndarray) -> None:
-    """Writes what vehicle ``v`` of game ``b`` sees, in degrees, metres, m/s and seconds.
+@part
+def look_up_or_down(
+    x: float, y: float, to_x: float, to_y: float, heading: float, rules: Rules, out: np.ndarray, at: int
+) -> None:
+    """Writes bearing in deg and distance in m from (x, y) to a point nearly north or south of it."""
+    dx, dy = rounded(to_x - x, rules), rounded(to_y - y, rules)
+    if abs(dx) < FLAT * abs(dy):
+        way = math.degrees(dx / dy) if dy > 0.0 else 180.0 + math.degrees(dx / dy)
+    else:
+        way = heading_of(dx, dy)
+    out[at] = turned(turned(way) - heading)
+    out[at + 1] = length(dx, dy, rules)
+
+
+@part
+def look_aside(
+    x: float, y: float, to_x: float, to_y: float, heading: float, rules: Rules, out: np.ndarray, at: int
+) -> None:
+    """Writes bearing in deg and distance in m from (x, y) to a point nearly east or west of it."""
+    dx, dy = rounded(to_x - x, rules), rounded(to_y - y, rules)
+    if abs(dy) < FLAT * abs(dx):
+        east = 90.0 if dx > 0.0 else -90.0
+        way = east - math.degrees(dy / dx)
+    else:
+        way = heading_of(dx, dy)
+    out[at] = turned(turned(way) - heading)
+    out[at + 1] = length(dx, dy, rules)
+
+
+@part
+def length(dx: float, dy: float, rules: Rules) -> float:
+    """Returns the length in m of a vector."""
+    return length32(dx, dy) if rules.float32 else math.sqrt(dx * dx + dy * dy)
+
+
+@part
+def see_each_other(state: State, b: int, v: int, other: int, rules: Rules, out: np.ndarray) -> None:
+    """Writes what ``v`` sees of ``other`` and the reverse, which shares the way between them, to ``out`` (V, O)."""
+    dx = rounded(rounded(state.pos[b, other, 0], rules) - rounded(state.pos[b, v, 0], rules), rules)
+    dy = rounded(rounded(state.pos[b, other, 1], rules) - rounded(state.pos[b, v, 1], rules), rules)
+    way, distance = heading_of(dx, dy), length(dx, dy, rules)
+    back = heading_of(0.0, 0.0) if distance == 0.0 else turned(way + 180.0)
+    describe(state, b, v, other, way, back, distance, rules, out[v])
+    describe(state, b, other, v, back, way, distance, rules, out[other])
+
+
+@part
+def describe(
+    state: State,
+    b: int,
+    v: int,
+    other: int,
+    way: float,
+    back: float,
+    distance: float,
+    rules: Rules,
+    out: np.ndarray,
+) -> None:
+    """Writes the eight numbers that ``v`` sees of ``other``, which is ``distance`` m away.
 
     Args:
         state: not changed.
         b: game.
-        v: vehicle.
+        v: who sees.
+        other: whom.
+        way: heading in deg from ``v`` to ``other``.
+        back: heading in deg from ``other`` to ``v``.
+        distance: m.
         rules: the game's constants.
-        raw_out: (13 + 16 n,) float64, overwritten; the fixed policies read it.
+        out: (O,) of vehicle ``v``.
     """
-    n = rules.team_size
-    team = v // n
-    heading = state.heading[b, v]
-    x = np.float64(np.float32(state.pos[b, v, 0]))
-    y = np.float64(np.float32(state.pos[b, v, 1]))
-    width, height = np.float64(np.float32(rules.width_m)), np.float64(np.float32(rules.height_m))
+    first, last = vehicles_of(team_of(v, rules), rules)
+    if first <= other < last:
+        place = other - first - (1 if other > v else 0)
+    else:
+        place = last - first - 1 + other - (rules.blue_size if first == 0 else 0)
+    at = OWN + OTHER * place
+    out[at] = turned(way - state.heading[b, v])
+    out[at + 1] = distance
+    out[at + 2] = turned(state.heading[b, other] - back)
+    out[at + 3] = state.speed[b, other]
+    out[at + 4] = state.has_flag[b, other]
+    out[at + 5] = state.on_own_side[b, other]
+    out[at + 6] = state.cooldown[b, other]
+    out[at + 7] = state.is_tagged[b, other]
 
-    # 1. The field. Blue's walls are top, right, bottom, left; red's are turned by half a circle
-    for at, side in ((0, 1 - team), (2, team)):
-        dx, dy = home_x(side, rules) - x, rules.height_m / 2.0 - y  # the one pair in double precision
-        raw_out[at] = bearing_of(dx, dy, heading)
-        raw_out[at + 1] = math.sqrt(dx * dx + dy * dy)
-    top, right = (4, 6) if team == BLUE else (8, 10)
-    bottom, left = 12 - top, 16 - right
-    see(x, y, heading, nearest(x, 0.0, width), height, raw_out, top)
-    see(x, y, heading, width, nearest(y, height, 0.0), raw_out, right)
-    see(x, y, heading, nearest(x, width, 0.0), 0.0, raw_out, bottom)
-    see(x, y, heading, 0.0, nearest(y, 0.0, height), raw_out, left)
-    see(x, y, heading, width / 2.0, nearest(y, 0.0, height), raw_out, 12)
 
-    # 2. Itself
-    raw_out[14] = state.speed[b, v]
-    raw_out[15] = state.has_flag[b, v]
-    raw_out[16] = state.on_own_side[b, v]
-    raw_out[17] = state.cooldown[b, v]
-    raw_out[18] = state.is_tagged[b, v]
-    raw_out[19] = state.score[b, team, CAPTURES]
-    raw_out[20] = state.score[b, 1 - team, CAPTURES]
+def ranges(rules: Rules) -> NDArray[np.float32]:
+    """Returns (2, O) float32: middle and half width of the range of every number of an observation.
 
-    # 3. The others: team-mates, then opponents
-    at = OWN
-    for side in range(2):
-        first = (team if side == 0 else 1 - team) * n
-        for other in range(first, first + n):
-            if other == v:
-                continue
-            other_x = np.float64(np.float32(state.pos[b, other, 0]))
-            other_y = np.float64(np.float32(state.pos[b, other, 1]))
-            see(x, y, heading, other_x, other_y, raw_out, at)
-            dx, dy = np.float64(np.float32(x - other_x)), np.float64(np.float32(y - other_y))
-            raw_out[at + 2] = turned(state.heading[b, other] - heading_of(dx, dy))
-            raw_out[at + 3] = state.speed[b, other]
-            raw_out[at + 4] = state.has_flag[b, other]
-            raw_out[at + 5] = state.on_own_side[b, other]
-            raw_out[at + 6] = state.cooldown[b, other]
-            raw_out[at + 7] = state.is_tagged[b, other]
-            at += OTHER
+    Ranges: bearings +-180 deg; distances 0 to the diagonal + ``obs_margin_m``, of the middle line 0 to half the width
+    or to the same; speed 0 to the maximum; yes and no 1 and 0; cooldown and score 0 to their maximum.
+    """
+    out = np.full((2, observation_size(rules)), 0.5, np.float32)
+    far = math.sqrt(rules.width_m * rules.width_m + rules.height_m * rules.height_m) + rules.obs_margin_m
+    for at in range(0, 14, 2):
+        out[0, at], out[1, at] = 0.0, 180.0
+        out[:, at + 1] = far / 2.0
+    if rules.obs_line_half:
+        out[:, 13] = rules.width_m / 2.0 / 2.0
+    out[:, 14] = rules.max_speed / 2.0
+    out[:, 17] = rules.tagging_cooldown_s / 2.0
+    out[:, 19:21] = rules.max_score / 2.0
+    for at in range(OWN, out.shape[1], OTHER):
+        out[0, at], out[1, at] = 0.0, 180.0
+        out[:, at + 1] = far / 2.0
+        out[0, at + 2], out[1, at + 2] = 0.0, 180.0
+        out[:, at + 3] = rules.max_speed / 2.0
+        out[:, at + 6] = rules.tagging_cooldown_s / 2.0
+    return out
 
 
 @kernel
-def normalise(raw: np.ndarray, rules: Rules, out: np.ndarray) -> None:
-    """Scales every number of ``raw`` by its range to [-1, 1]; nothing is clipped.
-
-    Ranges: bearings +-180 deg; distances 0 to the diagonal + 10 m, of the middle line 0 to half the width;
-    speed 0 to the maximum; yes and no 1 and 0; cooldown and score 0 to their maximum.
+def normalise(raw: np.ndarray, scale: np.ndarray, rules: Rules, out: np.ndarray) -> None:
+    """Scales every number of ``raw`` by its range to [-1, 1]; it is cut to that if ``rules.obs_clipped``.
 
     Args:
-        raw: (13 + 16 n,) as of ``observe``.
+        raw: (V, O) as of ``observe``.
+        scale: (2, O) as of ``ranges``.
         rules: the game's constants.
-        out: (13 + 16 n,) float32, overwritten.
+        out: (V, O) float32, overwritten.
     """
-    far = math.sqrt(rules.width_m * rules.width_m + rules.height_m * rules.height_m) + 10.0
-    for i in range(0, 14, 2):
-        out[i] = np.float32(raw[i]) / np.float32(180.0)
-        out[i + 1] = scaled(raw[i + 1], far)
-    out[13] = scaled(raw[13], rules.width_m / 2.0)
-    out[14] = scaled(raw[14], rules.max_speed)
-    out[15] = scaled(raw[15], 1.0)
-    out[16] = scaled(raw[16], 1.0)
-    out[17] = scaled(raw[17], rules.tagging_cooldown_s)
-    out[18] = scaled(raw[18], 1.0)
-    out[19] = scaled(raw[19], np.float64(rules.max_score))
-    out[20] = scaled(raw[20], np.float64(rules.max_score))
-    for at in range(OWN, len(raw), OTHER):
-        out[at] = np.float32(raw[at]) / np.float32(180.0)
-        out[at + 1] = scaled(raw[at + 1], far)
-        out[at + 2] = np.float32(raw[at + 2]) / np.float32(180.0)
-        out[at + 3] = scaled(raw[at + 3], rules.max_speed)
-        out[at + 4] = scaled(raw[at + 4], 1.0)
-        out[at + 5] = scaled(raw[at + 5], 1.0)
-        out[at + 6] = scaled(raw[at + 6], rules.tagging_cooldown_s)
-        out[at + 7] = scaled(raw[at + 7], 1.0)
-
-
-@part
-def scaled(value: float, top: float) -> float:
-    """Returns ``value`` of the range 0 to ``top`` in the range -1 to 1, in single precision throughout."""
-    half = np.float32(top / 2.0)
-    return (np.float32(value) - half) / half
+    for v in range(raw.shape[0]):
+        for i in range(raw.shape[1]):
+            out[v, i] = (np.float32(raw[v, i]) - scale[0, i]) / scale[1, i]
+        if rules.obs_clipped:
+            for i in range(raw.shape[1]):
+                out[v, i] = min(max(out[v, i], np.float32(-1.0)), np.float32(1.0))

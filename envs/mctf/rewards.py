@@ -1,122 +1,241 @@
-"""Rewards of one step, for every vehicle of a game, from the state after the step and what it keeps of before.
+"""Rewards of one step, for every vehicle of a game: what happened, counted in terms, times the weights of a reward.
 
 In the first step of a game nothing counts as new, as there is nothing to compare with.
 """
 
+import difflib
+import math
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
 import numpy as np
+from numba import cfunc, types
+from numpy.typing import NDArray
 
 from mctf.compiled import kernel, part
-from mctf.geometry import apart, home_x
+from mctf.geometry import apart, home, team_of
 from mctf.rules import Rules
 from mctf.state import State
 
-NAMES = ("custom_rew2", "custom_rew", "sparse")
-"""Names of the rewards; a reward's number is its place here."""
-CUSTOM_REW2, CUSTOM_REW, SPARSE = range(len(NAMES))
+TERMS = (
+    "team_captured",  # the team captured in this step
+    "opponents_captured",
+    "team_grabbed",  # the team holds the flag since this step
+    "opponents_grabbed",
+    "grabbed",  # this vehicle holds it since this step
+    "dropped",  # it has lost the flag that it carried, other than by a capture
+    "carries",
+    "newly_tagged",  # it has been tagged
+    "tagged",  # it is tagged, in every step that it lasts
+    "tagged_carrier",  # the same if it carried the flag the step before
+    "tags",  # it tagged an opponent
+    "tags_carrier",  # who carried the flag the step before
+    "wall_hit",  # it hit a wall in the last sub-step, or is out of bounds
+    "nearer_m",  # how much nearer it came to the opponents' flag's home, a carrier to its own
+)
+"""What a reward is made of: counts of this step, and ``nearer_m`` in m."""
+(
+    TEAM_CAPTURED,
+    OPPONENTS_CAPTURED,
+    TEAM_GRABBED,
+    OPPONENTS_GRABBED,
+    GRABBED,
+    DROPPED,
+    CARRIES,
+    NEWLY_TAGGED,
+    TAGGED,
+    TAGGED_CARRIER,
+    TAGS,
+    TAGS_CARRIER,
+    WALL_HIT,
+    NEARER,
+) = range(len(TERMS))
+
+WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
+    {
+        "custom_rew2": MappingProxyType(
+            {
+                "team_captured": 1.0,
+                "opponents_captured": -1.0,
+                "opponents_grabbed": -1.0,
+                "grabbed": 1.0,
+                "dropped": -1.0,
+                "newly_tagged": -0.05,
+                "tags": 0.05,
+                "tags_carrier": 1.0,
+                "wall_hit": -1.0,
+            }
+        ),
+        "custom_rew": MappingProxyType({}),
+        "sparse": MappingProxyType(
+            {
+                "team_captured": 100.0,
+                "opponents_captured": -100.0,
+                "team_grabbed": 50.0,
+                "opponents_grabbed": -50.0,
+                "tagged": -50.0,
+                "tagged_carrier": -50.0,
+                "tags": 100.0,
+                "tags_carrier": -50.0,  # less for a carrier, as in the original
+                "wall_hit": -100.0,
+            }
+        ),
+    }
+)
+"""The rewards by name; ``custom_rew2`` trained the paper's agents, and ``custom_rew`` is ``progress``."""
+
+OWN_SIGNATURE = types.float64(*(types.Array(types.float64, 1, "C"),) * 3)
+
+
+class Reward(NamedTuple):
+    """How a step is paid: ``weights`` times terms, plus ``own(terms, before, after)`` if ``has_own``.
+
+    Attributes:
+        weights: (len(TERMS),).
+        has_own: whether ``own`` is called.
+        own: compiled; takes (len(TERMS),), and (O,) twice: the unnormalised observation before and after the step.
+    """
+
+    weights: NDArray[np.float64]
+    has_own: bool
+    own: Any
+
+
+def progress(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+    """Returns 10 for a capture of the team, else what it is worth to come nearer to the goal; nothing while tagged.
+
+    The goal is the opponents' flag home, and the own one for a carrier. This is ``custom_rew``.
+    """
+    if terms[TAGGED] > 0.0:
+        return 0.0
+    if terms[TEAM_CAPTURED] > 0.0:
+        return 10.0
+    if terms[CARRIES] > 0.0:
+        return 0.1 + min(0.9, 0.9 * terms[NEARER] / 5.0)
+    return min(0.1, 0.1 * terms[NEARER] / 5.0)
+
+
+def nothing(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
+    """Returns 0."""
+    return 0.0
+
+
+def make_reward(
+    reward: str | Callable[..., float] = "custom_rew2", weights: Mapping[str, float] | None = None
+) -> Reward:
+    """Returns a reward.
+
+    Args:
+        reward: a name of ``WEIGHTS``, or a function of one's own, or where to import it: ``module:function``. It is
+            called as ``own(terms, before, after)`` for every vehicle and step and is compiled, so it must be of
+            numbers and numpy only.
+        weights: of terms, by their names in ``TERMS``, in place of the reward's; 0 switches a term off.
+
+    Raises:
+        ValueError: there is no such reward or term, or the function cannot be compiled.
+    """
+    weights = dict(weights or {})
+    for term, weight in weights.items():
+        if term not in TERMS:
+            raise ValueError(f"weights must be of {TERMS}, but has {term!r}.{_nearest(term, TERMS)}")
+        if isinstance(weight, bool | str) or not math.isfinite(weight):
+            raise ValueError(f"weights[{term!r}] must be a finite number, but is {weight!r}.")
+    named = WEIGHTS.get(reward, {}) if isinstance(reward, str) else {}
+    numbers = np.array([weights.get(term, named.get(term, 0.0)) for term in TERMS], np.float64)
+    if isinstance(reward, str) and reward in WEIGHTS:
+        own: Callable[..., float] = progress if reward == "custom_rew" else nothing
+    else:
+        own = _imported(reward) if isinstance(reward, str) else reward
+    try:
+        compiled = cfunc(OWN_SIGNATURE, nogil=True)(own)
+    except Exception as error:  # Numba raises many kinds, for anything that a user may write
+        said = str(error).strip().splitlines()[-1]
+        raise ValueError(f"reward must be a function that Numba compiles, but {own!r} is not: {said}") from error
+    return Reward(numbers, own is not nothing, compiled)
+
+
+def _imported(path: str) -> Callable[..., float]:
+    module, colon, name = path.partition(":")
+    if not colon:
+        raise ValueError(
+            f"reward must be one of {tuple(WEIGHTS)} or module:function, but is {path!r}.{_nearest(path, WEIGHTS)}"
+        )
+    try:
+        found = getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"reward must be importable, but {path!r} is not: {error}.") from error
+    if not callable(found):
+        raise ValueError(f"reward must be a function, but {path!r} is {found!r}.")
+    return found
+
+
+def _nearest(given: str, allowed: Any) -> str:
+    near = difflib.get_close_matches(given, list(allowed), 1)
+    return f" Did you mean {near[0]}?" if near else ""
 
 
 @kernel
-def rewards(kind: int, state: State, b: int, rules: Rules, out: np.ndarray) -> None:
+def rewards(
+    reward: Reward,
+    state: State,
+    b: int,
+    rules: Rules,
+    before: np.ndarray,
+    after: np.ndarray,
+    terms: np.ndarray,
+    out: np.ndarray,
+) -> None:
     """Writes the reward of every vehicle for the last step of game ``b``.
 
     Args:
-        kind: place in ``NAMES``. ``custom_rew2`` is what the paper trains with.
+        reward: as of ``make_reward``.
         state: after the step; not changed.
         b: game.
         rules: the game's constants.
+        before: (V, O) unnormalised observations before the step.
+        after: (V, O) after it.
+        terms: (len(TERMS),) scratch.
         out: (V,) float64, overwritten.
     """
+    for v in range(rules.blue_size + rules.red_size):
+        happened(state, b, v, rules, terms)
+        total = 0.0
+        for term in range(len(TERMS)):
+            total += reward.weights[term] * terms[term]
+        if reward.has_own:
+            total += reward.own(terms, before[v], after[v])
+        out[v] = total
+
+
+@part
+def happened(state: State, b: int, v: int, rules: Rules, out: np.ndarray) -> None:
+    """Writes the terms of vehicle ``v`` to ``out``."""
     first = state.steps[b] <= 1
-    for v in range(2 * rules.team_size):
-        us = v // rules.team_size
-        them = 1 - us
-        # What is new to this vehicle's team, +1 for its own success and -1 for the opponents'
-        grab = int(state.pickup[b, us] and not (first or state.was_pickup[b, us]))
-        lost_flag = int(state.pickup[b, them] and not (first or state.was_pickup[b, them]))
-        capture = int(state.capture[b, us] and not (first or state.was_capture[b, us]))
-        defeat = int(state.capture[b, them] and not (first or state.was_capture[b, them]))
-        # What is new to this vehicle
-        carries = state.has_flag[b, v]
-        carried = carries if first else state.was_carrying[b, v]
-        tagged = state.is_tagged[b, v]
-        newly_tagged = tagged and not (first or state.was_tagged[b, v])
-        target = state.tagged_opponent[b, v]
-        target_carried = target >= 0 and (state.has_flag[b, target] if first else state.was_carrying[b, target])
-        oob = state.oob[b, v]
-
-        if kind == CUSTOM_REW2:
-            dropped = carried and not carries and not state.capture[b, us]
-            grabbed = carries and not carried
-            out[v] = custom_rew2(
-                capture - defeat, int(grabbed) - lost_flag, dropped, newly_tagged, target >= 0, target_carried, oob
-            )
-        elif kind == SPARSE:
-            out[v] = sparse(capture - defeat, grab - lost_flag, tagged, carried, target >= 0, target_carried, oob)
-        else:
-            goal_x, goal_y = home_x(us if carries else them, rules), rules.height_m / 2.0
-            nearer = 0.0
-            if not first:
-                nearer = apart(state.was_pos[b, v, 0], state.was_pos[b, v, 1], goal_x, goal_y)
-                nearer -= apart(state.pos[b, v, 0], state.pos[b, v, 1], goal_x, goal_y)
-            out[v] = custom_rew(tagged, capture > 0, carries, nearer)
-
-
-@part
-def custom_rew2(
-    captures: int, grabs: int, dropped: bool, newly_tagged: bool, tags: bool, target_carried: bool, oob: bool
-) -> float:
-    """Returns +-1 for flags, captures and walls, +-0.05 for tags; the paper's training reward.
-
-    Args:
-        captures: own minus opponents', of the teams.
-        grabs: of this vehicle, minus the opponents' of their team.
-        dropped: lost the flag that it carried, other than by capture.
-        newly_tagged: it has been tagged.
-        tags: it tagged an opponent.
-        target_carried: that opponent carried the flag the step before.
-        oob: it hit a wall in the last sub-step.
-    """
-    reward = np.float64(captures + grabs)
-    if dropped:
-        reward -= 1.0
-    if newly_tagged:
-        reward -= 0.05
-    if tags:
-        reward += 1.05 if target_carried else 0.05
-    return reward - 1.0 if oob else reward
-
-
-@part
-def custom_rew(tagged: bool, captured: bool, carries: bool, nearer: float) -> float:
-    """Returns 10 for a capture of the team, else what it is worth to be ``nearer`` to the goal by so many m.
-
-    The goal is the opponents' flag home, and the own one for a carrier. Nothing while tagged.
-    """
-    if tagged:
-        return 0.0
-    if captured:
-        return 10.0
-    return 0.1 + min(0.9, 0.9 * nearer / 5.0) if carries else min(0.1, 0.1 * nearer / 5.0)
-
-
-@part
-def sparse(
-    captures: int, grabs: int, tagged: bool, carried: bool, tags: bool, target_carried: bool, oob: bool
-) -> float:
-    """Returns +-50 for flags, +-100 for captures and walls; being tagged costs in every step that it lasts.
-
-    Args:
-        captures: own minus opponents', of the teams; as ``grabs``.
-        grabs: own minus opponents'.
-        tagged: it is tagged.
-        carried: it carried the flag the step before.
-        tags: it tagged an opponent.
-        target_carried: that opponent carried the flag the step before; it is worth less then, as in the original.
-        oob: it hit a wall in the last sub-step.
-    """
-    reward = 100.0 * captures + 50.0 * grabs
-    if tagged:
-        reward -= 100.0 if carried else 50.0
-    if tags:
-        reward += 50.0 if target_carried else 100.0
-    return reward - 100.0 if oob else reward
+    us = team_of(v, rules)
+    them = 1 - us
+    carries = state.has_flag[b, v]
+    carried = carries if first else state.was_carrying[b, v]
+    tagged = state.is_tagged[b, v]
+    target = state.tagged_opponent[b, v]
+    out[TEAM_CAPTURED] = state.capture[b, us] and not (first or state.was_capture[b, us])
+    out[OPPONENTS_CAPTURED] = state.capture[b, them] and not (first or state.was_capture[b, them])
+    out[TEAM_GRABBED] = state.pickup[b, us] and not (first or state.was_pickup[b, us])
+    out[OPPONENTS_GRABBED] = state.pickup[b, them] and not (first or state.was_pickup[b, them])
+    out[GRABBED] = carries and not carried
+    out[DROPPED] = carried and not carries and not state.capture[b, us]
+    out[CARRIES] = carries
+    out[NEWLY_TAGGED] = tagged and not (first or state.was_tagged[b, v])
+    out[TAGGED] = tagged
+    out[TAGGED_CARRIER] = tagged and carried
+    out[TAGS] = target >= 0
+    out[TAGS_CARRIER] = 0.0
+    if target >= 0:
+        out[TAGS_CARRIER] = state.has_flag[b, target] if first else state.was_carrying[b, target]
+    out[WALL_HIT] = state.oob[b, v]
+    out[NEARER] = 0.0
+    if not first:
+        goal_x, goal_y = home(us if carries else them, rules)
+        out[NEARER] = apart(state.was_pos[b, v, 0], state.was_pos[b, v, 1], goal_x, goal_y)
+        out[NEARER] -= apart(state.pos[b, v, 0], state.pos[b, v, 1], goal_x, goal_y)

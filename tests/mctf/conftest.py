@@ -5,7 +5,8 @@ import pytest
 
 from mctf.kernel import step
 from mctf.rules import make_rules
-from mctf.state import empty, reset
+from mctf.start import reset
+from mctf.state import empty
 
 
 class Scene:
@@ -15,7 +16,7 @@ class Scene:
 
     def __init__(self, **rules):
         self.rules = make_rules(**rules)
-        self.state = empty(1, 2)
+        self.state = empty(1, self.rules)
         reset(self.state, 0, self.rules)
         for v, corner in enumerate(self.CORNERS):
             self.put(v, *corner)

@@ -42,7 +42,7 @@ def test_first_substep_ahead(scene):
 
 
 def test_acceleration_is_limited_without_the_switch(scene):
-    game = scene(substeps=1, accel_overshoots=False)
+    game = scene(substeps=1, accel_rule="limit")
     game.put(0, 120.0, 50.0, heading=90.0)
     game.step(AHEAD, STOP, STOP, STOP)
     assert game.speed[0] == pytest.approx(0.1)
@@ -54,7 +54,7 @@ def test_acceleration_is_limited_without_the_switch(scene):
 @pytest.mark.parametrize(("subtracts", "speed"), [(True, 1.5), (False, 2.0 * (1.0 - 0.85 * 0.315))])
 def test_turn_loss(scene, subtracts, speed):
     # rudder 0.35 * 90 = 31.5; thrust 40 holds 2 m/s: minus 0.26775 is still above the maximum
-    game = scene(substeps=1, turn_loss_subtracts=subtracts)
+    game = scene(substeps=1, turn_loss_rule="subtract" if subtracts else "multiply")
     game.put(0, 120.0, 50.0, heading=0.0, speed=1.5, thrust=40.0, heading_error_prev=90.0)
     assert game.step(RIGHT, STOP, STOP, STOP).speed[0] == pytest.approx(speed, abs=1e-7)
 
@@ -227,7 +227,7 @@ def test_the_flag_goes_with_its_carrier(scene):
 
 
 def test_single_precision_is_a_switch(scene):
-    games = [scene(float32_emulation=on) for on in (True, False)]
+    games = [scene(float32=on) for on in (True, False)]
     for game in games:
         game.put(0, 120.0, 50.0, heading=-37.0)
         game.step(5, STOP, STOP, STOP, times=3)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIME_OUT, finished
+from mctf.start import reset
 from mctf.state import (
     CAPTURED,
     CAPTURES,
@@ -20,7 +21,6 @@ from mctf.state import (
     TAGS,
     UNTAGGED,
     WAS_TAGGED,
-    reset,
 )
 
 

@@ -5,11 +5,13 @@ import threading
 import numpy as np
 import pytest
 
+from mctf.commands import STOP
 from mctf.draws import seed_of
 from mctf.observe import observation_size, observe
 from mctf.play import play_scripted
 from mctf.rules import make_rules
-from mctf.scripted import NAMES, RANDOM, STOP, act
+from mctf.scripted import NAMES, RANDOM, act
+from mctf.start import reset
 from mctf.state import (
     CAPTURED,
     CAPTURES,
@@ -23,7 +25,6 @@ from mctf.state import (
     UNTAGGED,
     WAS_TAGGED,
     empty,
-    reset,
 )
 
 
@@ -100,7 +101,7 @@ def test_the_seed_moves_the_random_policy_only():
     ("policies", "seeds", "named"),
     [
         (np.zeros((3, 2), int), np.zeros(3), "policies"),
-        (np.full((3, 4), 7), np.zeros(3), "policies"),
+        (np.full((3, 4), 99), np.zeros(3), "policies"),
         (np.zeros((3, 4), int), np.zeros(2), "seeds"),
     ],
 )
@@ -111,8 +112,9 @@ def test_what_does_not_fit_is_named(policies, seeds, named):
 
 def test_random_policy_draws_all_actions():
     raw, rules = np.zeros(45), make_rules()
-    assert [act(RANDOM, raw, rules, (i + 0.5) / 17) for i in range(17)] == list(range(17))
-    assert act(RANDOM, raw, rules, np.nextafter(1.0, 0.0)) == 16
+    state = empty(1, rules)
+    drawn = {act(RANDOM, state, 0, 0, raw, rules) for _ in range(500)}
+    assert drawn == set(range(17))
 
 
 def test_a_hard_defender_beyond_its_flag_stands_still(scene):
@@ -120,15 +122,15 @@ def test_a_hard_defender_beyond_its_flag_stands_still(scene):
     game.put(0, 190.0, 50.0)
     game.put(2, 100.0, 50.0, is_tagged=True)
     game.put(3, 90.0, 50.0, is_tagged=True)
-    raw = np.zeros(45)
-    observe(game.state, 0, 0, game.rules, raw)
-    assert act(NAMES.index("defend_hard"), raw, game.rules, 0.0) == STOP
+    raw = np.zeros((4, 45))
+    observe(game.state, 0, game.rules, raw)
+    assert act(NAMES.index("defend_hard"), game.state, 0, 0, raw[0], game.rules) == STOP
 
 
 def test_both_sides_see_the_same():
     """Half a turn of the field turns blue into red: walls, flags and team-mates are where they were."""
     rules = make_rules(team_size=3)
-    blue, red = empty(1, 3), empty(1, 3)
+    blue, red = empty(1, rules), empty(1, rules)
     rng = np.random.default_rng(0)
     for state in (blue, red):
         reset(state, 0, rules)
@@ -136,8 +138,7 @@ def test_both_sides_see_the_same():
     blue.heading[0] = rng.uniform(-180, 180, 6)
     red.pos[0] = np.array([200.0, 100.0]) - np.roll(blue.pos[0], 3, axis=0)
     red.heading[0] = (np.roll(blue.heading[0], 3) + 360.0) % 360.0 - 180.0
-    seen = np.zeros((2, observation_size(3)))
-    for v in range(3):
-        observe(blue, 0, v, rules, seen[0])
-        observe(red, 0, v + 3, rules, seen[1])
-        np.testing.assert_allclose(seen[0], seen[1], atol=1e-4)
+    seen = np.zeros((2, 6, observation_size(rules)))
+    observe(blue, 0, rules, seen[0])
+    observe(red, 0, rules, seen[1])
+    np.testing.assert_allclose(seen[0, :3], seen[1, 3:], atol=1e-4)

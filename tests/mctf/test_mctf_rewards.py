@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from mctf.rewards import CUSTOM_REW, CUSTOM_REW2, SPARSE, rewards
+from mctf.rewards import TERMS, make_reward, rewards
+
+CUSTOM_REW2, CUSTOM_REW, SPARSE = map(make_reward, ("custom_rew2", "custom_rew", "sparse"))
 
 
-def earned(game, kind):
-    out = np.zeros(4)
-    rewards(kind, game.state, 0, game.rules, out)
-    return out.tolist()
+def earned(game, reward):
+    out, seen = np.zeros(4), np.zeros((2, 4, 45))
+    rewards(reward, game.state, 0, game.rules, *seen, np.zeros(len(TERMS)), out)
+    return out.round(12).tolist()
 
 
 @pytest.fixture

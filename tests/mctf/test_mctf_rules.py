@@ -8,13 +8,22 @@ from mctf.rules import make_rules
 
 def test_defaults_are_the_papers():
     rules = make_rules()
-    assert (rules.team_size, rules.width_m, rules.height_m, rules.substeps, rules.max_time_s) == (2, 200, 100, 10, 420)
+    assert (rules.blue_size, rules.red_size, rules.width_m, rules.height_m, rules.substeps, rules.max_time_s) == (
+        2,
+        2,
+        200,
+        100,
+        10,
+        420,
+    )
     assert rules.untag_radius_m == rules.catch_radius_m == 10.0
     assert make_rules(untag_radius_m=15).untag_radius_m == 15.0
 
 
 def test_types_are_always_the_same():  # else every mixture would be compiled anew
-    odd = make_rules(2.0, [160, 80], 0, 10, True * 2, 1, max_score=3.0, oob_counts_as_tag=0)
+    odd = make_rules(
+        "clean", 2.0, [[100, 40], [20, 40]], 1, 9, world_size_m=[160, 80], max_score=3.0, oob_counts_as_tag=0
+    )
     assert [type(value) for value in odd] == [type(value) for value in make_rules()]
 
 
@@ -36,7 +45,6 @@ def test_types_are_always_the_same():  # else every mixture would be compiled an
         ("max_speed", 0.0),
         ("tau_s", "0.1"),
         ("max_time_s", math.nan),
-        ("tagging_cooldown_s", None),
         ("tagging_cooldown_s", [30]),
         ("oob_counts_as_tag", 2),
         ("stale_side", "yes"),
