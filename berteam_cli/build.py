@@ -12,6 +12,7 @@ import torch
 from berteam_cli.config import CommandConfig, EnvConfig, IslandConfig, LearnerConfig, OptimizerConfig, TrainConfig
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
+from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.env.rps import Rps
 from berteam_cli.errors import InputError
 from berteam_cli.games import Games
@@ -33,7 +34,7 @@ from berteam_cli.selector.uniform import Uniform
 from berteam_cli.training import Parts
 from berteam_cli.workers import Workers, available_cores
 
-ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps}
+ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps, "pettingzoo": Pettingzoo}
 SELECTORS: dict[str, Callable[..., Selector[Any]]] = {"uniform": Uniform, "mcaa": Mcaa, "berteam": Berteam}
 NO_NAMES = {"na", "nan", "null", "none", "n-a", "other"}  # pandas reads most of these as nothing
 
@@ -209,7 +210,7 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
         return Fixed(islands, rule)
     if name == "coevolution":
         return Coevolution(islands, rule, playing.workers, **settings)
-    names = settings.pop("opponents") or list(playing.env.fixed_policies)
-    check_policies(names, playing.env, "optimizer.opponents, which may be [] for all,")
+    names = settings.pop("opponents") or list(playing.env.fixed_policies[: playing.env.standard_policies])
+    check_policies(names, playing.env, "optimizer.opponents, which may be [] for the standard ones,")
     indices = tuple(playing.env.fixed_policies.index(x) for x in names)
     return MapElites(islands, rule, playing.workers, opponents=opponents(indices, config.team_size), **settings)

@@ -25,6 +25,11 @@ def choice(*allowed: str) -> Any:
     return field(default=MISSING, metadata={"allowed": allowed})
 
 
+def open_dict() -> Any:
+    """Returns an empty dictionary whose keys are the user's: `env.options.KEY=VALUE` needs no +."""
+    return OmegaConf.create({}, flags={"struct": False})
+
+
 @dataclass
 class EnvConfig:
     """What every game has."""
@@ -33,28 +38,90 @@ class EnvConfig:
 
 
 @dataclass
-class MctfConfig(EnvConfig):
-    """Settings of env/mctf.py; the meaning of each stands in mctf.rules."""
+class RewardWeightsConfig:
+    """Weights of mctf.rewards.TERMS."""
 
-    profile: str = choice("pyquaticus-2024-06")
-    reward: str = choice("custom_rew2", "custom_rew", "sparse")
+    team_captured: float | None = MISSING
+    opponents_captured: float | None = MISSING
+    team_grabbed: float | None = MISSING
+    opponents_grabbed: float | None = MISSING
+    grabbed: float | None = MISSING
+    dropped: float | None = MISSING
+    carries: float | None = MISSING
+    newly_tagged: float | None = MISSING
+    tagged: float | None = MISSING
+    tagged_carrier: float | None = MISSING
+    tags: float | None = MISSING
+    tags_carrier: float | None = MISSING
+    wall_hit: float | None = MISSING
+    nearer_m: float | None = MISSING
+
+
+@dataclass
+class MctfConfig(EnvConfig):
+    """Settings of env/mctf.py, for all versions of the rules; the meaning of each stands in mctf.rules."""
+
+    profile: str = choice("pyquaticus-2024-06", "pyquaticus-2025-11", "clean")
+    reward: str = MISSING
+    reward_weights: RewardWeightsConfig = MISSING
     world_size_m: list[float] = MISSING
+    flag_homes_m: Any = MISSING  # OmegaConf takes no whole numbers in lists of lists of floats
     flag_keepout_m: float = number()
     catch_radius_m: float = number(open_low=True)
     untag_radius_m: float | None = number(open_low=True)
     agent_radius_m: float = number()
-    max_speed: float = number(open_low=True)
+    max_speed: float | None = number(open_low=True)
     tau_s: float = number(open_low=True)
     substeps: int = number(1)
     max_time_s: float = number(open_low=True)
     max_score: int = number(1)
     tagging_cooldown_s: float = number(open_low=True)
-    oob_counts_as_tag: bool = MISSING
+    dynamics: str | None = choice("heron_2024", "heron", "surveyor")
+    accel_rule: str | None = choice("overshoot", "limit")
+    turn_loss_rule: str | None = choice("subtract", "multiply")
+    reverse_steering: bool | None = MISSING
+    speed_is_mean: bool | None = MISSING
+    first_kick: bool | None = MISSING
+    pid_reset: bool | None = MISSING
+    float32: bool | None = MISSING
+    action_speed: str | None = choice("fixed", "share")
+    missing_action: str | None = choice("heading", "stop")
+    blue_side: str | None = choice("right", "left")
+    starts: str | None = choice("quarter", "midway", "random")
+    wall_rule: str | None = choice("bounce", "drive_back")
+    oob_counts_as_tag: bool | None = MISSING
+    wall_tags: bool | None = MISSING
+    keepout_rule: str | None = choice("before", "after")
+    stale_side: bool | None = MISSING
+    grab_from_own_side: bool | None = MISSING
+    tag_at_zero: bool | None = MISSING
+    oob_may_tag: bool | None = MISSING
+    capture_first_only: bool | None = MISSING
+    untag_at_keepout: bool | None = MISSING
+    tie_at_max: str | None = choice("red", "draw")
+    clock_overruns: bool | None = MISSING
+    obs_margin_m: float | None = number()
+    obs_line_range: str | None = choice("half", "diagonal")
+    obs_clipped: bool | None = MISSING
+    field_points: str | None = choice("fixed", "scaled")
+    field_point_reach_m: float | None = number(open_low=True)
+    policy_version: str | None = choice("2024", "repaired", "2025")
 
 
 @dataclass
 class RpsConfig(EnvConfig):
     """Settings of env/rps.py."""
+
+
+@dataclass
+class PettingzooConfig(EnvConfig):
+    """Settings of env/pettingzoo.py."""
+
+    target: str | None = MISSING
+    options: dict[str, Any] = field(default_factory=open_dict)
+    teams: dict[str, list[str]] = field(default_factory=open_dict)
+    max_steps: int = number(1, 1_000_000)
+    score: str = MISSING
 
 
 @dataclass
@@ -246,18 +313,34 @@ class TournamentConfig(CommandConfig):
     """Settings of ``berteam tournament``."""
 
     run: str | None = MISSING
+    policies: list[str] = MISSING
     top: int = number(2)
     games_per_pair: int = number(1)
 
 
+@dataclass
+class ReplayConfig:
+    """Settings of ``berteam replay``."""
+
+    run: str | None = MISSING
+    blue: str | None = MISSING
+    red: str | None = MISSING
+    seed: int = number(0, 2**63 - 1)
+    format: str = choice("html", "gif", "both")
+    out: str | None = MISSING
+    on_exists: str = choice("error", "overwrite")
+    team_size: int = number(1, 512)
+    env: EnvConfig = MISSING
+
+
 SCHEMAS: dict[str, dict[str, type]] = {
-    "env": {"mctf": MctfConfig, "rps": RpsConfig},
+    "env": {"mctf": MctfConfig, "rps": RpsConfig, "pettingzoo": PettingzooConfig},
     "selector": {"uniform": UniformConfig, "mcaa": McaaConfig, "berteam": BerteamConfig},
     "optimizer": {"fixed": FixedOptimizerConfig, "coevolution": CoevolutionConfig, "mapelites": MapElitesConfig},
     "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig},
     "population": {"islands": PopulationConfig},
     "evaluation": {"truth": EvaluationConfig},
-    "command": {"train": TrainConfig, "tournament": TournamentConfig},
+    "command": {"train": TrainConfig, "tournament": TournamentConfig, "replay": ReplayConfig},
 }
 
 

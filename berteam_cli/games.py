@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from berteam_cli.acting import Policies
-from berteam_cli.env.base import Env, blank_results
+from berteam_cli.env.base import Env, Results, Stoppable, blank_results
 from berteam_cli.outcomes import NOBODY, Bools, Experience, Ints, Lineups, Outcomes
 from berteam_cli.workers import Workers
 from mctf.draws import seed_of
 
-GAMES_A_CALL = 8  # few enough that threads end together, enough that calling costs nothing
+GAMES_A_CALL = 8  # at most: enough that calling costs nothing
+CALLS = 32  # at least, where there are so many games: enough that threads end together
 
 
 @dataclass(frozen=True)
@@ -40,26 +41,40 @@ class Games:
             lineups: B games.
             key: below 2**63; games of the same key and index draw the same.
             record: whether anyone will learn; else the experience has no rows.
+
+        Where players may leave a game early, the experience has a row for each player of each game, (B * V, 1).
         """
         games = len(lineups)
         players = np.ascontiguousarray(lineups.teams.reshape(games, 2 * self.env.team_size))
         seeds = seeds_of(key, games)
         results = blank_results(self.env, games, record=record)
-        self.workers.map(
-            lambda start: self.env.play(
-                range(start, min(start + GAMES_A_CALL, games)), players, policies, seeds, results
-            ),
-            range(0, games, GAMES_A_CALL),
-        )
+        each = min(GAMES_A_CALL, max(1, games // CALLS))
+        try:
+            self.workers.map(
+                lambda start: self.env.play(range(start, min(start + each, games)), players, policies, seeds, results),
+                range(0, games, each),
+            )
+        except BaseException:  # Ctrl-C among others
+            if isinstance(self.env, Stoppable):
+                self.env.stop()
+            raise
         outcomes = Outcomes(lineups, results.scores, results.steps, results.events, seeds)
-        return outcomes, Experience(
-            players[: len(results.actions)],
-            results.observations,
-            results.actions,
-            results.rewards,
-            results.steps[: len(results.actions)],
-            results.terminated[: len(results.actions)],
-        )
+        return outcomes, experience_of(players, results)
+
+
+def experience_of(players: Ints, results: Results) -> Experience:
+    """Returns what the players saw and did: a row for each game, or for each player where players may leave early.
+
+    Args:
+        players: (B, V) who played.
+        results: of the games.
+    """
+    kept = len(results.actions)
+    seen = (players[:kept], results.observations, results.actions, results.rewards)
+    if not results.lengths.any():
+        return Experience(*seen, results.steps[:kept], results.terminated[:kept])
+    alone = (column.reshape(-1, 1, *column.shape[2:]) for column in seen)
+    return Experience(*alone, results.lengths.ravel(), results.ended.ravel())
 
 
 def seeds_of(key: int, games: int) -> np.ndarray:

@@ -74,6 +74,8 @@ class Outcomes:
 class Experience:
     """What every player of a batch of games saw, did and was paid for.
 
+    Where players may leave early, a row is one player of one game: (B V, 1) in place of (B, V).
+
     Attributes:
         members: (B, V) who played.
         observations: (B, V, L + 1, O) float32; row ``lengths[b]`` is what was seen after the last step.

@@ -15,7 +15,8 @@ from berteam_cli.errors import InputError
 
 ROOT = Path(__file__).parent.parent
 YAMLS = sorted((ROOT / "conf").glob("**/*.yaml"))
-NEEDS = {"hands": ["env=rps"], "fixed": []}  # what a choice cannot do without
+# What a choice cannot do without
+NEEDS = {"hands": ["env=rps"], "fixed": [], "pettingzoo": ["env.target=mctf:parallel_env", "env.options.team_size=2"]}
 
 
 def composed(*overrides, command="train"):

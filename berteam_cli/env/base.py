@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ from berteam_cli.outcomes import EVENTS, Bools, Floats, Ints
 class Results(NamedTuple):
     """Where games write what came of them; row b belongs to game b alone.
 
-    The last three have no rows where nobody is to learn from the games.
+    The last five have no rows where nobody is to learn from the games.
 
     Attributes:
         scores: (B, S).
@@ -24,6 +24,8 @@ class Results(NamedTuple):
         observations: (B, V, L + 1, O) float32.
         actions: (B, V, L) int16.
         rewards: (B, V, L) float32.
+        lengths: (B, V) steps of each player, of a kind of game that players may leave before its end; else zeros.
+        ended: (B, V) whether the rules ended such a game for the player.
     """
 
     scores: Floats
@@ -33,6 +35,8 @@ class Results(NamedTuple):
     observations: npt.NDArray[np.float32]
     actions: npt.NDArray[np.int16]
     rewards: npt.NDArray[np.float32]
+    lengths: Ints
+    ended: Bools
 
 
 class Env(Protocol):
@@ -45,6 +49,7 @@ class Env(Protocol):
         actions: A, how many discrete actions there are.
         longest: L, steps after which every game is over.
         fixed_policies: names of the scripted players that come with the game.
+        standard_policies: how many of them, the first, tournaments are among and teams are measured against.
     """
 
     name: str
@@ -53,6 +58,7 @@ class Env(Protocol):
     actions: int
     longest: int
     fixed_policies: tuple[str, ...]
+    standard_policies: int
 
     def play(
         self,
@@ -76,6 +82,14 @@ class Env(Protocol):
         """Returns the settings that decide how strong a team is, for finding a table of Elos that fits them."""
 
 
+@runtime_checkable
+class Stoppable(Protocol):
+    """A kind of game whose games take long."""
+
+    def stop(self) -> None:
+        """Ends games that other threads play, since nobody waits for them any more; no more can be played."""
+
+
 def blank_results(env: Env, games: int, *, record: bool) -> Results:
     """Returns room for the results of ``games`` games, and for their trajectories if ``record``."""
     players, kept = 2 * env.team_size, games if record else 0
@@ -87,4 +101,6 @@ def blank_results(env: Env, games: int, *, record: bool) -> Results:
         observations=np.empty((kept, players, env.longest + 1, env.observation_size), dtype=np.float32),
         actions=np.empty((kept, players, env.longest), dtype=np.int16),
         rewards=np.empty((kept, players, env.longest), dtype=np.float32),
+        lengths=np.zeros((kept, players), dtype=np.int64),
+        ended=np.zeros((kept, players), dtype=np.bool_),
     )

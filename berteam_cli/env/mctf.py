@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from berteam_cli.acting import FIXED, Policies, act
 from berteam_cli.env.base import Results
-from berteam_cli.outcomes import Ints
+from berteam_cli.outcomes import Floats, Ints
 from mctf.compiled import kernel, part
 from mctf.draws import next_uniform
+from mctf.geometry import team_of
 from mctf.kernel import RUNNING, TIME_OUT, finished, step
-from mctf.observe import normalise, observation_size, observe
-from mctf.rewards import NAMES as REWARDS
-from mctf.rewards import rewards
+from mctf.observe import normalise, observe, ranges
+from mctf.rewards import TERMS, Reward, make_reward, rewards
 from mctf.rules import ACTIONS, Rules, make_rules
 from mctf.scripted import NAMES as FIXED_POLICIES
+from mctf.scripted import PAPER
 from mctf.scripted import act as act_fixed
-from mctf.state import CAPTURED, CAPTURES, GRABBED, HIT_WALL, TAGGED, State, empty, reset
+from mctf.start import reset
+from mctf.state import CAPTURED, CAPTURES, GRABBED, HIT_WALL, TAGGED, State, empty
 
 
 @dataclass(frozen=True, init=False)
@@ -30,20 +33,25 @@ class Mctf:
 
     Attributes:
         rules: of the game.
-        reward: what learners are paid for, an index into mctf.rewards.NAMES.
+        reward: what learners are paid for.
+        scale: (2, O) ranges of what players see.
     """
 
     team_size: int
     rules: Rules
-    reward: int
+    reward: Reward
+    scale: npt.NDArray[np.float32]
     observation_size: int
     longest: int
     name: str = "mctf"
     actions: int = ACTIONS
     fixed_policies: tuple[str, ...] = field(default=FIXED_POLICIES)
+    standard_policies: int = len(PAPER)
 
-    def __init__(self, team_size: int, reward: str, **settings: Any) -> None:
-        """Takes the settings of mctf.rules.make_rules.
+    def __init__(
+        self, team_size: int, reward: str, reward_weights: Mapping[str, float | None] | None = None, **settings: Any
+    ) -> None:
+        """Takes the settings of mctf.rules.make_rules and mctf.rewards.make_reward.
 
         Raises:
             ValueError: a setting is not allowed, or games would be too long to record.
@@ -54,18 +62,61 @@ class Mctf:
             raise ValueError(f"max_time_s gives games of {longest} steps; at most 1000000 are allowed.")
         object.__setattr__(self, "team_size", team_size)
         object.__setattr__(self, "rules", rules)
-        object.__setattr__(self, "reward", REWARDS.index(reward))
-        object.__setattr__(self, "observation_size", observation_size(team_size))
+        weights = {term: weight for term, weight in (reward_weights or {}).items() if weight is not None}
+        object.__setattr__(self, "reward", make_reward(reward, weights))
+        object.__setattr__(self, "scale", ranges(rules))
+        object.__setattr__(self, "observation_size", self.scale.shape[1])
         object.__setattr__(self, "longest", longest)
 
     def play(  # noqa: D102
         self, games: range, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results
     ) -> None:
-        state = empty(1, self.team_size)
-        play_games(games.start, games.stop, players, policies, seeds, results, self.rules, self.reward, state)
+        scratch = blank_scratch(self, policies)
+        play_games(
+            games.start, games.stop, players, policies, seeds, results, self.rules, self.reward, self.scale, scratch
+        )
 
     def fingerprint(self) -> dict[str, object]:  # noqa: D102
-        return {"env": self.name, **self.rules._asdict()}
+        return {"env": "mctf", **self.rules._asdict()}
+
+
+class Scratch(NamedTuple):
+    """Room for one game at a time.
+
+    Attributes:
+        state: of one game.
+        raw: (V, O) what is seen, in units.
+        before: (V, O) the same a step ago; kept only where a reward wants it.
+        seen: (V, O) float32, normalised.
+        actions: (V,).
+        paid: (V,).
+        terms: (len(TERMS),).
+        work: (2, widest layer) float32, for networks.
+    """
+
+    state: State
+    raw: Floats
+    before: Floats
+    seen: npt.NDArray[np.float32]
+    actions: Ints
+    paid: Floats
+    terms: Floats
+    work: npt.NDArray[np.float32]
+
+
+def blank_scratch(env: Mctf, policies: Policies) -> Scratch:
+    """Returns room for the games of ``env``, played by ``policies``."""
+    seen = (2 * env.team_size, env.observation_size)
+    return Scratch(
+        state=empty(1, env.rules),
+        raw=np.zeros(seen),
+        before=np.zeros(seen),
+        seen=np.zeros(seen, dtype=np.float32),
+        actions=np.zeros(seen[0], dtype=np.int64),
+        paid=np.zeros(seen[0]),
+        terms=np.zeros(len(TERMS)),
+        work=np.zeros((2, policies.sizes.max() + 1), dtype=np.float32),
+    )
 
 
 @kernel
@@ -77,10 +128,11 @@ def play_games(
     seeds: np.ndarray,
     results: Results,
     rules: Rules,
-    reward: int,
-    state: State,
+    reward: Reward,
+    scale: np.ndarray,
+    scratch: Scratch,
 ) -> None:
-    """Plays games ``first`` to ``last - 1``, one after the other on the same ``state``; see ``Env.play``.
+    """Plays games ``first`` to ``last - 1``, one after the other; see ``Env.play``.
 
     Args:
         first: row to begin with.
@@ -90,36 +142,32 @@ def play_games(
         seeds: (B,) uint64.
         results: changed.
         rules: of the game.
-        reward: an index into mctf.rewards.NAMES.
-        state: of one game; changed.
+        reward: of learners.
+        scale: (2, O) as of mctf.observe.ranges.
+        scratch: changed.
     """
-    vehicles = 2 * rules.team_size
+    state, raw, before, seen, actions = scratch.state, scratch.raw, scratch.before, scratch.seen, scratch.actions
     record = len(results.actions) > 0
-    raw = np.zeros((vehicles, 13 + 16 * rules.team_size))
-    seen = np.zeros((vehicles, raw.shape[1]), dtype=np.float32)
-    actions = np.zeros(vehicles, dtype=np.int64)
-    paid = np.zeros(vehicles)
-    work = np.zeros((2, policies.sizes.max() + 1), dtype=np.float32)
-    stream = np.zeros(1, dtype=np.uint64)
-
     for b in range(first, last):
+        state.stream[0] = seeds[b]
         reset(state, 0, rules)
-        stream[0] = seeds[b]
         moment = 0
-        look(state, rules, raw, seen)
+        look(state, scale, rules, raw, seen)
         while finished(state, 0, rules) == RUNNING:
-            for v in range(vehicles):
-                actions[v] = chosen(policies, players[b, v], raw[v], seen[v], rules, work, stream)
+            for v in range(len(actions)):
+                actions[v] = chosen(policies, players[b, v], state, v, raw[v], seen[v], rules, scratch.work)
             if record:
                 note(results, b, moment, seen)
-                for v in range(vehicles):
+                for v in range(len(actions)):
                     results.actions[b, v, moment] = actions[v]
             step(state, 0, actions, rules)
-            look(state, rules, raw, seen)
+            if record and reward.has_own:
+                remember(raw, before)
+            look(state, scale, rules, raw, seen)
             if record:
-                rewards(reward, state, 0, rules, paid)
-                for v in range(vehicles):
-                    results.rewards[b, v, moment] = paid[v]
+                rewards(reward, state, 0, rules, before, raw, scratch.terms, scratch.paid)
+                for v in range(len(actions)):
+                    results.rewards[b, v, moment] = scratch.paid[v]
             moment += 1
         if record:
             note(results, b, moment, seen)
@@ -129,11 +177,18 @@ def play_games(
 
 
 @part
-def look(state: State, rules: Rules, raw: np.ndarray, seen: np.ndarray) -> None:
+def look(state: State, scale: np.ndarray, rules: Rules, raw: np.ndarray, seen: np.ndarray) -> None:
     """Writes what all players see: ``raw`` (V, O) in units, ``seen`` (V, O) float32 as networks want it."""
-    for v in range(len(raw)):
-        observe(state, 0, v, rules, raw[v])
-        normalise(raw[v], rules, seen[v])
+    observe(state, 0, rules, raw)
+    normalise(raw, scale, rules, seen)
+
+
+@part
+def remember(raw: np.ndarray, before: np.ndarray) -> None:
+    """Copies (V, O) ``raw`` to ``before``; without Numba's memory there are no slices."""
+    for v in range(raw.shape[0]):
+        for i in range(raw.shape[1]):
+            before[v, i] = raw[v, i]
 
 
 @part
@@ -146,12 +201,19 @@ def note(results: Results, b: int, moment: int, seen: np.ndarray) -> None:
 
 @part
 def chosen(
-    policies: Policies, k: int, raw: np.ndarray, seen: np.ndarray, rules: Rules, work: np.ndarray, stream: np.ndarray
+    policies: Policies,
+    k: int,
+    state: State,
+    v: int,
+    raw: np.ndarray,
+    seen: np.ndarray,
+    rules: Rules,
+    work: np.ndarray,
 ) -> int:
-    """Returns the action of policy ``k``; every policy draws two numbers, whether it needs them or not."""
-    chance, choice = next_uniform(stream, 0), next_uniform(stream, 0)
+    """Returns the action of policy ``k`` for vehicle ``v``; a network draws two numbers, even if it needs none."""
     if policies.kind[k] == FIXED:
-        return act_fixed(policies.fixed[k], raw, rules, choice)
+        return act_fixed(policies.fixed[k], state, 0, v, raw, rules)
+    chance, choice = next_uniform(state.stream, 0), next_uniform(state.stream, 0)
     return act(policies, k, seen, work, chance, choice)
 
 
@@ -161,8 +223,8 @@ def settle(state: State, rules: Rules, b: int, results: Results) -> None:
     gap = state.score[0, 0, CAPTURES] - state.score[0, 1, CAPTURES]
     results.scores[b, 0] = 1.0 if gap > 0 else 0.5 if gap == 0 else 0.0
     results.scores[b, 1] = 1.0 - results.scores[b, 0]
-    for v in range(2 * rules.team_size):
-        side = v // rules.team_size
+    for v in range(rules.blue_size + rules.red_size):
+        side = team_of(v, rules)
         results.events[b, side, 0] += state.events[0, v, CAPTURED]
         results.events[b, side, 1] += state.events[0, v, GRABBED]
         results.events[b, side, 2] += state.events[0, v, TAGGED]

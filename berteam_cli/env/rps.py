@@ -12,7 +12,7 @@ from berteam_cli.acting import FIXED, Policies, act
 from berteam_cli.env.base import Results
 from berteam_cli.outcomes import Ints
 from mctf.draws import next_uniform
-from rps import HANDS, duels_won
+from rps import HANDS, hands_beaten
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Rps:
     actions: int = len(HANDS)
     longest: int = 1
     fixed_policies: tuple[str, ...] = HANDS
+    standard_policies: int = len(HANDS)
 
     def play(  # noqa: D102
         self, games: range, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results
@@ -56,9 +57,9 @@ def play_games(
             else:
                 chance, choice = next_uniform(stream, 0), next_uniform(stream, 0)
                 hands[v] = act(policies, k, seen, work, chance, choice)
-        won = duels_won(hands[:size], hands[size:]), duels_won(hands[size:], hands[:size])
+        beaten = hands_beaten(hands[:size], hands[size:]), hands_beaten(hands[size:], hands[:size])
         for side in range(2):
-            gap = won[side] - won[1 - side]
+            gap = beaten[1 - side] - beaten[side]
             results.scores[b, side] = 1.0 if gap > 0 else 0.5 if gap == 0 else 0.0
         results.steps[b] = 1
         results.terminated[b] = True
@@ -67,4 +68,4 @@ def play_games(
             for v in range(vehicles):
                 side = v // size
                 results.actions[b, v, 0] = hands[v]
-                results.rewards[b, v, 0] = (won[side] - won[1 - side]) / (size * size)
+                results.rewards[b, v, 0] = (beaten[1 - side] - beaten[side]) / size

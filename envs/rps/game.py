@@ -10,16 +10,17 @@ HANDS = ("rock", "paper", "scissors")
 
 
 @njit(cache=True, nogil=True)
-def duels_won(ours: np.ndarray, theirs: np.ndarray) -> int:
-    """Returns how many of all duels between two teams the first one wins.
+def hands_beaten(ours: np.ndarray, theirs: np.ndarray) -> int:
+    """Returns how many hands of a team are beaten by any hand of the other.
 
     Args:
         ours: (T,) index into HANDS of each member's hand.
         theirs: (T,) the same of the other team.
     """
-    won = 0
+    beaten = 0
     for a in ours:
         for b in theirs:
-            if (a - b) % 3 == 1:
-                won += 1
-    return won
+            if (b - a) % 3 == 1:
+                beaten += 1
+                break
+    return beaten

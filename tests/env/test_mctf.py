@@ -4,7 +4,7 @@ import pytest
 from berteam_cli.acting import fixed_policies, joined
 from berteam_cli.games import pairings, seeds_of
 from mctf import play_scripted
-from mctf.env import parallel_env
+from mctf.parallel import parallel_env
 from mctf.state import CAPTURES, EVENTS
 from tests.makers import mctf, random_networks
 

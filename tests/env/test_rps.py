@@ -1,38 +1,54 @@
 import numpy as np
+import pytest
+from scipy.optimize import linprog
 
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
 from berteam_cli.games import Games, pairings
+from berteam_cli.selector.base import Field, unordered_teams
+from berteam_cli.selector.mcaa import Mcaa, McaaState
 from berteam_cli.workers import Workers
-from rps import HANDS, duels_won
+from rps import HANDS, hands_beaten
 from tests.makers import random_networks
+from tests.selector.test_berteam import LEARNER, begun, far, made
+
+FIXED = fixed_policies(range(3))
+EQUILIBRIA = {1: [1 / 3] * 3, 2: [0.0 if a == b else 1 / 3 for a, b in unordered_teams(3, 2)]}
 
 
 def test_who_beats_whom():
     rock, paper, scissors = (np.array([HANDS.index(x)]) for x in ("rock", "paper", "scissors"))
-    assert duels_won(paper, rock) == duels_won(rock, scissors) == duels_won(scissors, paper) == 1
-    assert duels_won(rock, paper) == duels_won(scissors, rock) == duels_won(paper, scissors) == 0
-    assert duels_won(rock, rock) == 0
+    assert hands_beaten(rock, paper) == hands_beaten(scissors, rock) == hands_beaten(paper, scissors) == 1
+    assert hands_beaten(paper, rock) == hands_beaten(rock, scissors) == hands_beaten(scissors, paper) == 0
+    assert hands_beaten(rock, rock) == 0
 
 
-def test_teams_by_hand():
-    # Rock and paper against two scissors: rock wins twice, paper loses twice.
-    assert duels_won(np.array([0, 1]), np.array([2, 2])) == 2
-    assert duels_won(np.array([2, 2]), np.array([0, 1])) == 2
+@pytest.mark.parametrize(
+    ("ours", "theirs", "beaten"),
+    [
+        ("rp", "ss", (1, 2)),  # paper is cut, and both scissors are blunted
+        ("rp", "rs", (1, 2)),
+        ("rp", "ps", (2, 1)),
+        ("rr", "rp", (2, 0)),
+        ("rr", "ps", (2, 1)),
+        ("rr", "rs", (0, 1)),
+        ("rps", "rrr", (1, 3)),
+        ("rps", "rps", (3, 3)),
+    ],
+)
+def test_teams_by_hand(ours, theirs, beaten):
+    ours, theirs = (np.array(["rps".index(x) for x in team]) for team in (ours, theirs))
+    assert (hands_beaten(ours, theirs), hands_beaten(theirs, ours)) == beaten
 
 
 def test_games_and_what_they_pay():
     games = Games(Rps(2), Workers(1))
-    lineups = pairings(np.array([[0, 0], [0, 1]]), np.array([[2, 1], [2, 2]]))
-    outcomes, seen = games.play(fixed_policies(range(3)), lineups, 0, record=True)
-    np.testing.assert_array_equal(outcomes.scores, [[0.5, 0.5], [0.5, 0.5]])
-    np.testing.assert_array_equal(seen.rewards[:, :, 0], 0)
-    won = pairings(np.array([[1, 1]]), np.array([[0, 1]]))
-    outcomes, seen = games.play(fixed_policies(range(3)), won, 0, record=True)
-    np.testing.assert_array_equal(outcomes.scores, [[1, 0]])
-    np.testing.assert_array_equal(seen.rewards[0, :, 0], [0.5, 0.5, -0.5, -0.5])
-    np.testing.assert_array_equal(seen.actions[0, :, 0], [1, 1, 0, 1])
-    assert seen.terminated[0]
+    lineups = pairings(np.array([[0, 1], [1, 1], [0, 1]]), np.array([[2, 2], [0, 1], [1, 0]]))
+    outcomes, seen = games.play(FIXED, lineups, 0, record=True)
+    np.testing.assert_array_equal(outcomes.scores, [[1, 0], [1, 0], [0.5, 0.5]])
+    np.testing.assert_array_equal(seen.rewards[:, :, 0], [[0.5, 0.5, -0.5, -0.5], [0.5, 0.5, -0.5, -0.5], [0, 0, 0, 0]])
+    np.testing.assert_array_equal(seen.actions[0, :, 0], [0, 1, 2, 2])
+    assert seen.terminated.all()
 
 
 def test_networks_play_too():
@@ -41,3 +57,55 @@ def test_networks_play_too():
     lineups = pairings(rng.integers(5, size=(50, 3)), rng.integers(5, size=(50, 3)))
     outcomes, _ = games.play(random_networks(5, games.env), lineups, 1)
     np.testing.assert_array_equal(outcomes.scores.sum(axis=1), 1)
+
+
+@pytest.mark.parametrize("team_size", [1, 2])
+def test_the_equilibrium_is_the_only_one(team_size):
+    """Each team's chance is the same in every mixture that no team beats on average."""
+    teams = unordered_teams(3, team_size)
+    k, j = map(np.ravel, np.indices((len(teams), len(teams))))
+    outcomes, _ = Games(Rps(team_size), Workers(1)).play(FIXED, pairings(teams[k], teams[j]), 0)
+    gains = (outcomes.scores[:, 0] - outcomes.scores[:, 1]).reshape(len(teams), len(teams))
+    np.testing.assert_array_equal(gains, -gains.T)
+    for team, chance in enumerate(EQUILIBRIA[team_size]):
+        for sense in (1, -1):
+            aim = sense * np.eye(len(teams))[team]
+            best = linprog(aim, A_ub=-gains.T, b_ub=np.zeros(len(teams)), A_eq=[[1] * len(teams)], b_eq=[1])
+            assert best.x[team] == pytest.approx(chance, abs=1e-9)
+
+
+def learnt(selector, state, epochs, games=1000):
+    """Returns the distribution over teams, the mean of the later half of the epochs: chance stirs each of them."""
+    played = Games(Rps(selector.field.team_size), Workers(1))
+    rng = np.random.default_rng(0)
+    seen = []
+    for epoch in range(epochs):
+        lineups = selector.select(state, games, np.zeros(3), rng)
+        outcomes, _ = played.play(FIXED, lineups, epoch)
+        state, _ = selector.learn(state, outcomes, rng)
+        seen.append(selector.distribution(state).probability)
+    return np.mean(seen[epochs // 2 :], axis=0)
+
+
+def test_mcaa_reaches_the_equilibrium_of_the_game_of_one():
+    """One island for each hand; it begins far off."""
+    selector = Mcaa(Field(np.arange(3), 1), 0.5, 1)
+    start = McaaState(np.array([1.5, 0.0, -0.5]), np.zeros(3, dtype=np.int64), 0)
+    assert selector.distribution(start).probability.max() > 0.7
+    np.testing.assert_allclose(learnt(selector, start, 300), EQUILIBRIA[1], atol=0.03)
+
+
+@pytest.mark.parametrize("team_size", [1, 2])
+def test_berteam_settles_where_shares_are_win_rates(team_size):
+    """The equilibrium of the game of one, and its soft counterpart in the game of two.
+
+    With chances p of each ordered pair of equal hands and q of different ones, equal hands win with p + 2 q, different
+    ones with 2 p + 2 q. Shares like these have p / q = (sqrt(17) - 1) / 4, where equal chances would have 1.
+    """
+    selector = made(3, team_size, weighting=True, **LEARNER | {"batch_size": 1024, "capacity": 4000, "width": 16})
+    start = begun(selector, seed=1)
+    ratio = (np.sqrt(17) - 1) / 4
+    equal, different = ratio / (3 * ratio + 6), 2 / (3 * ratio + 6)
+    shares = [equal if a == b else different for a, b in unordered_teams(3, 2)] if team_size == 2 else EQUILIBRIA[1]
+    assert far(selector.distribution(start).probability, shares) > 0.2
+    assert far(learnt(selector, start, 100), shares) < 0.03
