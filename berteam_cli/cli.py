@@ -24,6 +24,7 @@ WORDS = {
     "train": "one run: selector x optimizer x env; -m sweeps",
     "resume": "goes on with a run from its last checkpoint",
     "tournament": "every team against every other",
+    "replay": "one game as a page for the browser or as a GIF",
     "inspect": "the tables of a run in the terminal",
     "list": "what can be chosen",
 }
@@ -67,7 +68,8 @@ def run(word: str, words: list[str]) -> None:
     """
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
-    commands = {"train": composed, "tournament": composed, "resume": resume, "inspect": inspect, "list": listing}
+    commands = {"train": composed, "tournament": composed, "replay": replay}
+    commands |= {"resume": resume, "inspect": inspect, "list": listing}
     commands[word](word, words)
 
 
@@ -86,7 +88,7 @@ def composed(word: str, words: list[str]) -> None:
     if not (given.hydra_help or given.shell_completion):
         check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
     sys.argv = [f"berteam {word}", *words]
-    task = {"train": train_task, "tournament": tournament_task}[word]
+    task = {"train": train_task, "tournament": tournament_task, "replay": replay_task}[word]
     hydra.main(version_base="1.3", config_path="pkg://berteam_cli.conf", config_name=word)(task)()
     if given.multirun and Sweeps.failed:
         raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
@@ -99,12 +101,17 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
         InputError: they do not.
     """
     from berteam_cli import build  # noqa: PLC0415
-    from berteam_cli.command.tournament import players  # noqa: PLC0415
 
     if word == "train":
         build.parts(config)
+    elif word == "tournament":
+        from berteam_cli.command import tournament  # noqa: PLC0415
+
+        tournament.players(config, keys)
     else:
-        players(config, keys)
+        from berteam_cli.command import replay  # noqa: PLC0415
+
+        replay.players(config, keys)
 
 
 class Sweeps:
@@ -126,6 +133,13 @@ def tournament_task(cfg: DictConfig) -> float:
     from berteam_cli.command.tournament import play  # noqa: PLC0415
 
     return perform(play, cfg)
+
+
+def replay_task(cfg: DictConfig) -> float:
+    """Films a game; what Hydra calls. Returns NaN as ``tournament_task``."""
+    from berteam_cli.command.replay import replay as film  # noqa: PLC0415
+
+    return perform(lambda config, _, out: film(config, out), cfg)
 
 
 def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) -> float:
@@ -187,6 +201,22 @@ def resume(word: str, words: list[str]) -> None:
     from berteam_cli.command.resume import resume as go_on  # noqa: PLC0415
 
     go_on(given.run, given.overrides)
+
+
+def replay(word: str, words: list[str]) -> None:
+    """Films a game; a first word that is no override and no flag is the folder of a run.
+
+    Raises:
+        InputError: the run is named twice, or several games are asked for.
+    """
+    if words and not words[0].startswith("-") and ("=" not in words[0] or Path(words[0]).is_dir()):
+        if any(other.startswith("run=") for other in words[1:]):
+            raise InputError(f"The run is named twice: {words[0]} and run=.")
+        quoted = words[0].replace("'", "\\'")
+        words = [f"run='{quoted}'", *words[1:]]
+    if {"-m", "--multirun"} & set(words):
+        raise InputError("replay films one game, so it takes no --multirun.")
+    composed(word, words)
 
 
 def inspect(word: str, words: list[str]) -> None:

@@ -100,8 +100,8 @@ def players(config: TournamentConfig, overridden: Collection[str] = ()) -> Entry
     if config.run is None:
         return of_fixed_policies(config)
     for key in overridden:
-        if key.split(".", maxsplit=1)[0] in {"env", "team_size"}:
-            raise InputError(f"{key} has no effect with run={config.run}, whose game and team size are taken.")
+        if key.split(".", maxsplit=1)[0] in {"env", "team_size", "policies"}:
+            raise InputError(f"{key} has no effect with run={config.run}, whose game, team size and members are taken.")
     return of_run(config)
 
 
@@ -109,17 +109,19 @@ def of_fixed_policies(config: TournamentConfig) -> Entry:
     """Returns all teams of the fixed policies.
 
     Raises:
-        InputError: they are too many.
+        InputError: they are too many, or a policy is not the game's.
     """
     games = build.games(config)
-    called = games.env.fixed_policies
+    env = games.env
+    called = config.policies or list(env.fixed_policies[: env.standard_policies])
+    build.check_policies(called, env, "policies")
     check_size(team_count(len(called), config.team_size), f"team_size={config.team_size}", config)
     return Entry(
         games,
-        fixed_policies(range(len(called))),
+        fixed_policies([env.fixed_policies.index(name) for name in called]),
         unordered_teams(len(called), config.team_size),
-        list(called),
-        {"reference": table_name(games.env)},
+        called,
+        {} if config.policies else {"reference": table_name(env)},
     )
 
 

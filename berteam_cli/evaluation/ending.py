@@ -53,7 +53,7 @@ def conclude(
             team_distribution=f"estimated from {distribution.samples} drawn teams; rows `other` hold what is not listed"
         )
     game = parts.games.env
-    opponents = len(reference_teams(len(game.fixed_policies), game.team_size, settings.reference_teams))
+    opponents = len(reference_teams(game.standard_policies, game.team_size, settings.reference_teams))
     each = opponents * settings.games_per_pair
     budget = run.played if settings.games is None else settings.games
     rng = generator(parts.seed, EVALUATION, run.epoch)

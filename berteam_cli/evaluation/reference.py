@@ -63,7 +63,7 @@ def reference(games: Games, most: int) -> Reference:
         most: so many teams at most.
     """
     env = games.env
-    teams = reference_teams(len(env.fixed_policies), env.team_size, most)
+    teams = reference_teams(env.standard_policies, env.team_size, most)
     name = table_name(env)
     shipped = importlib.resources.files("berteam_cli.rating").joinpath(name)
     if shipped.is_file():
@@ -73,6 +73,6 @@ def reference(games: Games, most: int) -> Reference:
         if set(names) <= set(table.index):
             return Reference(teams, table.loc[names, "elo"].to_numpy(dtype=float), f"shipped table {name}")
     log.info("No Elos of the fixed teams are shipped for these settings: %d teams play for them now.", len(teams))
-    acting = fixed_policies(range(len(env.fixed_policies)))
+    acting = fixed_policies(range(env.standard_policies))
     elos = tournament(games, acting, teams, GAMES_PER_PAIR, SEED).elos
     return Reference(teams, elos, f"tournament of {len(teams)} teams, {GAMES_PER_PAIR} games a pair, seed {SEED}")

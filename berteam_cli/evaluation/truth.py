@@ -183,7 +183,7 @@ def truth(
         rng: orders the members and seeds the games.
     """
     teams = chosen.teams
-    acting = joined([members, fixed_policies(range(len(games.env.fixed_policies)))])
+    acting = joined([members, fixed_policies(range(games.env.standard_policies))])
     anchors = len(reference.teams)
     ours = np.repeat(teams, anchors * games_per_pair, axis=0)
     theirs = np.tile(np.repeat(reference.teams + len(members.kind), games_per_pair, axis=0), (len(teams), 1))

@@ -1,0 +1,300 @@
+"""berteam replay: one game as a page or a GIF, of a trained run's members or of the fixed policies."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from berteam_cli import build, checkpoint
+from berteam_cli.acting import Policies, fixed_policies
+from berteam_cli.command.inspect import read_table
+from berteam_cli.config import ReplayConfig, checked
+from berteam_cli.env.mctf import Mctf
+from berteam_cli.errors import InputError, RunError
+from berteam_cli.folder import new_folder, read_manifest
+from berteam_cli.games import Games, pairings
+from berteam_cli.outcomes import Experience, Ints, Outcomes
+from berteam_cli.population import names, policies
+from berteam_cli.stored import stored_config
+from berteam_cli.workers import Workers
+from mctf.film import Film, filmed
+from mctf.kernel import RUNNING
+from mctf.page import write_page
+from mctf.render import clock, write_gif
+from mctf.rules import BLUE, RED
+from mctf.state import CAPTURES, GRABS
+
+Team = list[int]
+
+
+@dataclass(frozen=True)
+class Match:
+    """Who plays in the film.
+
+    Attributes:
+        env: the game.
+        policies: how the players act.
+        names: of the players.
+        blue, red: players of each team, place by place.
+        title: what is played.
+    """
+
+    env: Mctf
+    policies: Policies
+    names: list[str]
+    blue: Team
+    red: Team
+    title: str
+
+
+def replay(config: ReplayConfig, out: Path | None) -> float:
+    """Plays a game and writes it as configured; returns NaN, having no figure to tell.
+
+    Args:
+        config: checked.
+        out: file to write, with or without its ending; None has it beside the run.
+
+    Raises:
+        InputError: the config does not go together, or a file is in the way.
+        RunError: the game did not come out the same when it was played again.
+    """
+    match = players(config)
+    files = places(config, match, out)
+    outcomes, experience = played(match, config.seed)
+    film = checked_film(match.env, outcomes, experience)
+    steering = [f"{member} {match.names[member]}" for member in match.blue + match.red]
+    for kind, path in files.items():
+        if kind == "html":
+            write_whole(path, lambda part: write_page(film, part, steering, match.title))
+        else:
+            write_whole(path, lambda part: write_gif(film, part))
+    print(f"{match.title}.", ending(film), *files.values(), sep="\n")
+    return math.nan
+
+
+def players(config: ReplayConfig, overridden: Collection[str] = ()) -> Match:
+    """Returns who plays.
+
+    Args:
+        config: checked.
+        overridden: keys that the command line gave.
+
+    Raises:
+        InputError: the config does not go together, or there is no such run.
+        RunError: the run has no checkpoint.
+    """
+    if config.run is None:
+        return of_fixed_policies(config)
+    for key in overridden:
+        if key.split(".", maxsplit=1)[0] in {"env", "team_size"}:
+            raise InputError(f"{key} has no effect with run={config.run}, whose game and team size are taken.")
+    return of_run(config, Path(config.run))
+
+
+def of_fixed_policies(config: ReplayConfig) -> Match:
+    """Returns two teams of fixed policies.
+
+    Raises:
+        InputError: a team is not named, or is none.
+    """
+    game = filmable(build.env(config.env, config.team_size))
+    called = list(game.fixed_policies)
+    for key, given in (("blue", config.blue), ("red", config.red)):
+        if given is None:
+            raise InputError(
+                f"{key} must name a team when no run is given, "
+                f"such as {key}={example(sizes(game)[0])}, which is {called[0]} first."
+            )
+    blue, red = (
+        team(key, str(given), size, len(called), called)
+        for key, given, size in zip(("blue", "red"), (config.blue, config.red), sizes(game), strict=True)
+    )
+    title = f"Fixed policies: {versus(blue, red, called)}, seed {config.seed}"
+    return Match(game, fixed_policies(range(len(called))), called, blue, red, title)
+
+
+def of_run(config: ReplayConfig, folder: Path) -> Match:
+    """Returns two teams of a trained run, acting as they are evaluated; by default the strongest ones.
+
+    Raises:
+        InputError: there is no such run, or no such team in it.
+        RunError: it has no checkpoint.
+    """
+    read_manifest(folder)
+    parts = build.parts(checked(stored_config(folder)))
+    game = filmable(parts.games.env)
+    run = checkpoint.load(folder, parts).run
+    population, islands = run.population, parts.optimizer.islands
+    given = strongest(folder, config.blue, config.red)
+    blue, red = (
+        team(key, text, size, population.size)
+        for key, text, size in zip(("blue", "red"), given, sizes(game), strict=True)
+    )
+    called = names(islands, population)
+    title = f"{folder} after epoch {run.epoch}: {versus(blue, red, called)}, seed {config.seed}"
+    return Match(game, policies(islands, population, explore=False), called, blue, red, title)
+
+
+def filmable(game: object) -> Mctf:
+    """Returns ``game`` if it can be filmed.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if not isinstance(game, Mctf):
+        raise InputError(f"Only games of env=mctf can be filmed, but this one is env={getattr(game, 'name', game)}.")
+    return game
+
+
+def sizes(game: Mctf) -> tuple[int, int]:
+    """Returns how many members blue and red have."""
+    return game.rules.blue_size, game.rules.red_size
+
+
+def strongest(folder: Path, blue: str | None, red: str | None) -> tuple[str, str]:
+    """Returns the teams given, and for one that is not the strongest rated team that is not its opponent.
+
+    Raises:
+        InputError: too few teams were rated.
+    """
+    if blue is not None and red is not None:
+        return blue, red
+    table = read_table(folder, "elo")
+    rated = [] if table is None else list(table.sort_values("rank", kind="stable").team)
+
+    def best_but(opponent: str | None, key: str) -> str:
+        free = [name for name in rated if name != opponent]
+        if not free:
+            raise InputError(f"{folder} has rated too few teams to choose one; name it: {key}=MEMBER-MEMBER.")
+        return free[0]
+
+    blue = best_but(red, "blue") if blue is None else blue
+    return blue, best_but(blue, "red") if red is None else red
+
+
+def team(key: str, given: str, size: int, members: int, called: Collection[str] = ()) -> Team:
+    """Returns the members that ``given`` names, place by place.
+
+    Args:
+        key: of the config, for the message.
+        given: indices or names, joined by hyphens.
+        size: how many they must be.
+        members: how many there are.
+        called: their names, if they may be named.
+
+    Raises:
+        InputError: they are not as many, or one does not exist.
+    """
+    words = given.split("-")
+    if len(words) != size:
+        raise InputError(
+            f"{key} must be {size} members joined by hyphens, such as {example(size)}, but {given!r} is {len(words)}."
+        )
+    found = []
+    for word in words:
+        if word in called:
+            found.append(list(called).index(word))
+        elif word.isdecimal() and int(word) < members:
+            found.append(int(word))
+        elif called and not word.isdecimal():
+            raise InputError.choice(f"A member of {key}", word, called)
+        else:
+            raise InputError(f"A member of {key} must be one of 0 to {members - 1}, but is {word!r}.")
+    return found
+
+
+def example(size: int) -> str:
+    """Returns a team as it may be given."""
+    return "-".join(str(member % 7) for member in range(size))
+
+
+def hyphenated(members: Team) -> str:
+    """Returns a team with its members in their places."""
+    return "-".join(map(str, members))
+
+
+def versus(blue: Team, red: Team, called: list[str]) -> str:
+    """Returns who plays whom, by index and by name."""
+    sides = (f"{hyphenated(side)} ({' + '.join(called[member] for member in side)})" for side in (blue, red))
+    return "blue {} against red {}".format(*sides)
+
+
+def places(config: ReplayConfig, match: Match, out: Path | None) -> dict[str, Path]:
+    """Returns the file of each format that is wanted.
+
+    Raises:
+        InputError: its name does not go with the format, or it exists and may not be overwritten.
+    """
+    kinds = ("html", "gif") if config.format == "both" else (config.format,)
+    if out is None:
+        folder = new_folder("replay") if config.run is None else Path(config.run) / "replay"
+        out = folder / f"{hyphenated(match.blue)}_{hyphenated(match.red)}"
+    elif out.suffix in {".html", ".gif"}:
+        if kinds != (out.suffix[1:],):
+            raise InputError(
+                f"out={out} does not go with format={config.format}; name the other format or leave its ending away."
+            )
+        out = out.with_suffix("")
+    files = {kind: out.with_name(f"{out.name}.{kind}") for kind in kinds}
+    for path in files.values():
+        if path.exists() and config.on_exists != "overwrite":
+            raise InputError(f"{path} exists already; name another file with out=FILE, or say on_exists=overwrite.")
+    return files
+
+
+def played(match: Match, seed: int) -> tuple[Outcomes, Experience]:
+    """Returns the game, with what everybody did in it; ``seed`` is of the players' chance."""
+    games = Games(match.env, Workers(1))
+    lineups = pairings(np.array([match.blue]), np.array([match.red]))
+    return games.play(match.policies, lineups, seed, record=True)
+
+
+def checked_film(game: Mctf, outcomes: Outcomes, experience: Experience) -> Film:
+    """Returns the game of ``outcomes``, played again from its actions.
+
+    Raises:
+        RunError: it did not come out the same.
+    """
+    actions = experience.actions[0, :, : outcomes.steps[0]].T
+    try:
+        film = filmed(actions, game.rules, int(outcomes.seeds[0]))
+    except ValueError as error:
+        raise RunError(f"The game did not come out the same when it was played again: {error}") from error
+    counted: Ints = np.stack([outcomes.event("captures")[0], outcomes.event("grabs")[0]])
+    again = film.score[-1][:, [CAPTURES, GRABS]].T
+    if film.end == RUNNING or not np.array_equal(again, counted):
+        raise RunError(
+            f"The game did not come out the same when it was played again: captures and grabs were "
+            f"{counted.tolist()}, then {again.tolist()} after {len(actions)} steps. No film was written."
+        )
+    return film
+
+
+def ending(film: Film) -> str:
+    """Returns how a game ended, in words."""
+    blue, red = (int(film.score[-1, side, CAPTURES]) for side in (BLUE, RED))
+    result = "It is a draw" if blue == red else f"{'Blue' if blue > red else 'Red'} wins"
+    return f"{result}, {blue} to {red}, after {clock(film.time[-1])} ({len(film.time) - 1} steps)."
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Makes ``path`` with ``write``; there is never half of it.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    part = path.with_name(f"{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            write(part)
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
