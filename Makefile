@@ -33,9 +33,10 @@ bench: setup ## speed: figures, targets and ratios
 check: setup ## replays the recorded games
 	$(BIN)/python -m mctf.check tests/traces/*.npz
 
-picture: setup ## the picture of the README, from a run of the paper's first experiment
+picture: setup ## the pictures of the README and docs
 	$(BIN)/berteam train experiment=paper_fixed epochs=600 out=outputs/picture on_exists=overwrite
 	$(BIN)/python docs/picture.py outputs/picture docs/picture.png
+	$(BIN)/python docs/field.py docs/field.png
 
 reference: setup ## the Elos of the fixed teams that the package ships
 	$(BIN)/berteam tournament out=outputs/reference on_exists=overwrite

@@ -1,78 +1,22 @@
-"""Speed: figures beside targets, and ratios taken in the same run. `make bench` prints the table.
-
-Nothing here is asserted: the machines are shared, and a test that fails when somebody else compiles is no test.
-"""
+"""Speed of training: epochs, learners, selectors, and how soon a run starts."""
 
 from __future__ import annotations
 
-import platform
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from hydra import compose, initialize_config_module
-from rich.console import Console
-from rich.table import Table
 from stable_baselines3 import PPO
 
-from berteam_cli import build
-from berteam_cli.acting import fixed_policies
-from berteam_cli.compose import CONF, prepare
-from berteam_cli.config import checked
-from berteam_cli.env.mctf import Mctf
-from berteam_cli.evaluation.tournament import tournament
-from berteam_cli.games import Games, pairings
 from berteam_cli.outcomes import Experience
-from berteam_cli.selector.base import unordered_teams
 from berteam_cli.training import begin, epoch
-from berteam_cli.workers import Workers, available_cores
-
-Row = tuple[str, str, str]
-
-
-def parts(*overrides: str) -> Any:
-    prepare()
-    with initialize_config_module(CONF, version_base="1.3"):
-        return build.parts(checked(compose("train", overrides=list(overrides))))
-
-
-def seconds(task: Callable[[], object], times: int = 3) -> float:
-    """Returns the median time of ``task``, after one run that does not count."""
-    task()
-    taken = []
-    for _ in range(times):
-        start = time.perf_counter()
-        task()
-        taken.append(time.perf_counter() - start)
-    return float(np.median(taken))
-
-
-def game_rows() -> Iterator[Row]:
-    env = Mctf(team_size=2, reward="custom_rew2")
-    rng = np.random.default_rng(0)
-    lineups = pairings(rng.integers(7, size=(200, 2)), rng.integers(7, size=(200, 2)))
-    fixed = fixed_policies(range(7))
-    for workers in (1, available_cores()):
-        games = Games(env, Workers(workers))
-        steps = int(games.play(fixed, lineups, 0, record=True)[0].steps.sum())
-        speed = steps / seconds(lambda games=games: games.play(fixed, lineups, 0, record=True))
-        target = "50,000 (goal 200,000)" if workers == 1 else ""
-        yield f"env steps/s, fixed policies, observed and paid, {workers} thread(s)", f"{speed:,.0f}", target
-    trained = parts("population=ppo50", "workers=1")
-    acting = trained.optimizer.islands[0].learner.policies(begin(trained).population.minds[0], explore=True)
-    lineups = pairings(rng.integers(50, size=(50, 2)), rng.integers(50, size=(50, 2)))
-    steps = int(trained.games.play(acting, lineups, 0)[0].steps.sum())
-    speed = steps / seconds(lambda: trained.games.play(acting, lineups, 0, record=True))
-    yield "env steps/s, four networks of 64x64, 1 thread", f"{speed:,.0f}", ""
-    games = Games(env, Workers(available_cores()))
-    taken = seconds(lambda: tournament(games, fixed, unordered_teams(7, 2), 10, 0), 1)
-    yield "fixed-policy tournament, 3,780 games, s", f"{taken:.1f}", "10"
+from berteam_cli.workers import available_cores
+from tests.bench.timing import Row, parts, seconds
 
 
 def epoch_rows() -> Iterator[Row]:
@@ -183,19 +127,4 @@ def start_rows() -> Iterator[Row]:
         yield "berteam train until the first game, s", f"{seconds(lambda: quiet(*words), 1):.1f}", "5"
 
 
-def main() -> None:
-    table = Table(
-        title=f"{platform.processor() or platform.machine()}, {available_cores()} cores; torch {torch.__version__}"
-    )
-    for column in ("what", "here", "target"):
-        table.add_column(column, justify="left" if column == "what" else "right")
-    torch.set_num_threads(1)
-    for rows in (game_rows, epoch_rows, learner_rows, selector_rows, start_rows):
-        for row in rows():
-            table.add_row(*row)
-            print(*row, sep=" | ", flush=True)
-    Console(width=150).print(table)
-
-
-if __name__ == "__main__":
-    main()
+ROWS = (epoch_rows, learner_rows, selector_rows, start_rows)
