@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -53,6 +55,8 @@ def env(config: EnvConfig, team_size: int) -> Env:
         InputError: its settings do not go together.
     """
     settings = asdict(config)
+    if os.getcwd() not in sys.path:  # where a user's own reward may be; last, so that it hides nothing
+        sys.path.append(os.getcwd())
     try:
         return ENVS[settings.pop("name")](team_size=team_size, **settings)
     except ValueError as error:
@@ -211,6 +215,6 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
     if name == "coevolution":
         return Coevolution(islands, rule, playing.workers, **settings)
     names = settings.pop("opponents") or list(playing.env.fixed_policies[: playing.env.standard_policies])
-    check_policies(names, playing.env, "optimizer.opponents, which may be [] for the standard ones,")
+    check_policies(names, playing.env, "optimizer.opponents, or optimizer.opponents=[] for the standard ones,")
     indices = tuple(playing.env.fixed_policies.index(x) for x in names)
     return MapElites(islands, rule, playing.workers, opponents=opponents(indices, config.team_size), **settings)

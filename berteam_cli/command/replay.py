@@ -23,7 +23,7 @@ from berteam_cli.population import names, policies
 from berteam_cli.stored import stored_config
 from berteam_cli.workers import Workers
 from mctf.film import Film, filmed
-from mctf.kernel import RUNNING
+from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIED
 from mctf.page import write_page
 from mctf.render import clock, write_gif
 from mctf.rules import BLUE, RED
@@ -147,7 +147,7 @@ def filmable(game: object) -> Mctf:
         InputError: it cannot.
     """
     if not isinstance(game, Mctf):
-        raise InputError(f"Only games of env=mctf can be filmed, but this one is env={getattr(game, 'name', game)}.")
+        raise InputError(f"Only games of env=mctf and env=mctf_2025 can be filmed, but this one is env={game.name}.")
     return game
 
 
@@ -170,7 +170,10 @@ def strongest(folder: Path, blue: str | None, red: str | None) -> tuple[str, str
     def best_but(opponent: str | None, key: str) -> str:
         free = [name for name in rated if name != opponent]
         if not free:
-            raise InputError(f"{folder} has rated too few teams to choose one; name it: {key}=MEMBER-MEMBER.")
+            raise InputError(
+                f"{folder} has rated too few teams to choose one (with evaluation.games=0 none); name both, such as "
+                f"blue={example(2)} red={example(2)}."
+            )
         return free[0]
 
     blue = best_but(red, "blue") if blue is None else blue
@@ -279,6 +282,7 @@ def ending(film: Film) -> str:
     """Returns how a game ended, in words."""
     blue, red = (int(film.score[-1, side, CAPTURES]) for side in (BLUE, RED))
     result = "It is a draw" if blue == red else f"{'Blue' if blue > red else 'Red'} wins"
+    result = {BLUE_WON: "Blue wins", RED_WON: "Red wins", TIED: "It is a draw"}.get(film.end, result)
     return f"{result}, {blue} to {red}, after {clock(film.time[-1])} ({len(film.time) - 1} steps)."
 
 

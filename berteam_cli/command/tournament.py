@@ -115,7 +115,11 @@ def of_fixed_policies(config: TournamentConfig) -> Entry:
     env = games.env
     called = config.policies or list(env.fixed_policies[: env.standard_policies])
     build.check_policies(called, env, "policies")
-    check_size(team_count(len(called), config.team_size), f"team_size={config.team_size}", config)
+    twice = sorted({name for name in called if called.count(name) > 1})
+    if twice:
+        raise InputError(f"policies must name each policy once, but has {', '.join(twice)} more than once.")
+    said = f"policies={called} with team_size" if config.policies else "team_size"
+    check_size(team_count(len(called), config.team_size), f"{said}={config.team_size}", config)
     return Entry(
         games,
         fixed_policies([env.fixed_policies.index(name) for name in called]),

@@ -12,22 +12,23 @@ import numpy.typing as npt
 
 from berteam_cli.acting import FIXED, Policies, act
 from berteam_cli.env.base import Results
+from berteam_cli.errors import RunError
 from berteam_cli.outcomes import Floats, Ints
 from mctf.compiled import kernel, part
 from mctf.draws import next_uniform
 from mctf.geometry import team_of
-from mctf.kernel import RUNNING, TIME_OUT, finished, step
+from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIME_OUT, finished, step
 from mctf.observe import normalise, observe, ranges
 from mctf.rewards import TERMS, Reward, make_reward, rewards
 from mctf.rules import ACTIONS, Rules, make_rules
 from mctf.scripted import NAMES as FIXED_POLICIES
 from mctf.scripted import PAPER
 from mctf.scripted import act as act_fixed
-from mctf.start import reset
+from mctf.start import forget, reset
 from mctf.state import CAPTURED, CAPTURES, GRABBED, HIT_WALL, TAGGED, State, empty
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, eq=False)
 class Mctf:
     """The game of package mctf between two teams of equal size.
 
@@ -62,8 +63,7 @@ class Mctf:
             raise ValueError(f"max_time_s gives games of {longest} steps; at most 1000000 are allowed.")
         object.__setattr__(self, "team_size", team_size)
         object.__setattr__(self, "rules", rules)
-        weights = {term: weight for term, weight in (reward_weights or {}).items() if weight is not None}
-        object.__setattr__(self, "reward", make_reward(reward, weights))
+        object.__setattr__(self, "reward", make_reward(reward, reward_weights))
         object.__setattr__(self, "scale", ranges(rules))
         object.__setattr__(self, "observation_size", self.scale.shape[1])
         object.__setattr__(self, "longest", longest)
@@ -75,9 +75,24 @@ class Mctf:
         play_games(
             games.start, games.stop, players, policies, seeds, results, self.rules, self.reward, self.scale, scratch
         )
+        if self.reward.has_own and len(results.rewards):
+            check_paid(games, seeds, results)
 
     def fingerprint(self) -> dict[str, object]:  # noqa: D102
         return {"env": "mctf", **self.rules._asdict()}
+
+
+def check_paid(games: range, seeds: npt.NDArray[np.uint64], results: Results) -> None:
+    """Checks what a function of the user's paid in ``games``.
+
+    Raises:
+        RunError: it failed, or gave something else than a finite number.
+    """
+    for b in games:
+        if not np.isfinite(results.rewards[b, :, : results.steps[b]]).all():
+            raise RunError(
+                f"env.reward must give finite numbers, but failed or did not in game {b}, of seed {seeds[b]}."
+            )
 
 
 class Scratch(NamedTuple):
@@ -150,6 +165,7 @@ def play_games(
     record = len(results.actions) > 0
     for b in range(first, last):
         state.stream[0] = seeds[b]
+        forget(state, 0, rules)
         reset(state, 0, rules)
         moment = 0
         look(state, scale, rules, raw, seen)
@@ -219,8 +235,11 @@ def chosen(
 
 @part
 def settle(state: State, rules: Rules, b: int, results: Results) -> None:
-    """Writes scores and events of the finished game to row ``b`` of ``results``; more captures win."""
+    """Writes scores and events of the finished game to row ``b`` of ``results``; more captures win on time."""
+    end = finished(state, 0, rules)
     gap = state.score[0, 0, CAPTURES] - state.score[0, 1, CAPTURES]
+    if end != TIME_OUT:
+        gap = 1 if end == BLUE_WON else -1 if end == RED_WON else 0
     results.scores[b, 0] = 1.0 if gap > 0 else 0.5 if gap == 0 else 0.0
     results.scores[b, 1] = 1.0 - results.scores[b, 0]
     for v in range(rules.blue_size + rules.red_size):

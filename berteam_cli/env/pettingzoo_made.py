@@ -14,6 +14,7 @@ from pettingzoo import AECEnv, ParallelEnv
 from berteam_cli.errors import did_you_mean
 
 SIDES = ("blue", "red")
+MOST_ACTIONS = 32_767  # as 16 bits hold
 
 
 class Game(NamedTuple):
@@ -70,7 +71,9 @@ def made(game: Game) -> ParallelEnv[str, Any, Any]:
     try:
         module = importlib.import_module(name)
     except Exception as error:
-        raise Unfit(f"target={game.target}: module {name} cannot be imported: {said(error)}.") from error
+        raise Unfit(
+            f"target={game.target}: module {name} cannot be imported, {game.folder} included: {said(error)}."
+        ) from error
     make = getattr(module, function, None)
     if not callable(make):
         near = did_you_mean(function, [x for x in vars(module) if callable(getattr(module, x))])
@@ -102,6 +105,8 @@ def facts_of(env: ParallelEnv[str, Any, Any], teams: dict[str, list[str]]) -> Fa
             )
         if not isinstance(acting, Discrete):
             raise Unfit(f"target: agent {agent} has the action space {acting}; only Discrete is supported.")
+        if acting.n > MOST_ACTIONS:
+            raise Unfit(f"target: agent {agent} has {acting.n} actions; at most {MOST_ACTIONS} are supported.")
         sizes.setdefault(int(seeing.n) if isinstance(seeing, Discrete) else int(np.prod(seeing.shape)), agent)
         actions.setdefault(int(acting.n), agent)
     for what, counts in (("observations of {} numbers", sizes), ("{} actions", actions)):

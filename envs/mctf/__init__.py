@@ -52,6 +52,10 @@ _LAZY = {
 }
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def __getattr__(name: str) -> object:
     """Imports what needs Numba or PettingZoo when it is first asked for, so that ``import mctf`` is fast."""
     if name not in _LAZY:

@@ -120,7 +120,7 @@ class Batch:
                 a game does not matter.
 
         Raises:
-            RuntimeError: there is no game.
+            RuntimeError: there is no game, or the reward function failed.
             ValueError: actions are not allowed; no game has been stepped then.
         """
         lanes = self._lanes
@@ -134,6 +134,12 @@ class Batch:
         self._step(lanes, *self._chunks[0], self._view, self.rules, self._reward, self._scratch[0])
         for one in work:
             one.result()
+        unpaid = np.flatnonzero(~np.isfinite(lanes.paid).all(axis=1))
+        if len(unpaid):
+            raise RuntimeError(
+                f"reward must be finite, but the function failed or gave {lanes.paid[unpaid[0]].tolist()} "
+                f"in game {lanes.game[unpaid[0]]}."
+            )
         np.not_equal(lanes.end, RUNNING, out=self._done)
         return self._turn(np.flatnonzero(self._done))
 

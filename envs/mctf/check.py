@@ -28,9 +28,9 @@ SHOWN = 5
 
 def main(paths: list[str]) -> int:
     """Checks files, prints what was found and returns the exit status."""
-    if not paths:
+    if not paths or any(path.startswith("-") for path in paths):
         print("Give the files with recorded games: python -m mctf.check FILE ...")
-        return 2
+        return 0 if {"-h", "--help"} & set(paths) else 2
     status = 0
     for path in paths:
         try:

@@ -13,7 +13,7 @@ from mctf.kernel import RUNNING, advance, finished
 from mctf.observe import normalise, observation_size, observe
 from mctf.rewards import TERMS, Reward, rewards
 from mctf.rules import Rules
-from mctf.start import reset
+from mctf.start import forget, reset
 from mctf.state import State, empty
 from mctf.view import View
 
@@ -135,10 +135,8 @@ def start_lanes(lanes: Lanes, which: np.ndarray, seeds: np.ndarray, first_game: 
     for b in which:
         lanes.end[b] = RUNNING
         lanes.game[b] = NO_GAME
+        forget(lanes.state, b, rules)
         for v in range(lanes.raw.shape[1]):
-            # A new game is that of a new environment, which has no controller's memory to keep
-            lanes.state.heading_error_prev[b, v] = 0.0
-            lanes.state.heading_error_known[b, v] = False
             for i in range(lanes.seen.shape[2]):
                 lanes.seen[b, v, i] = 0.0
         if game < len(seeds):

@@ -20,7 +20,7 @@ from mctf.rules import HERON_2024, Rules
 
 TO_RADIANS = math.pi / 180.0
 SIN1, SIN2, SIN3, SIN4, SIN5 = ((-1.0) ** i / math.factorial(2 * i + 1) for i in range(1, 6))
-COS1, COS2, COS3, COS4, COS5, COS6 = ((-1.0) ** i / math.factorial(2 * i) for i in range(1, 7))
+COS1, COS2, COS3, COS4, COS5 = ((-1.0) ** i / math.factorial(2 * i) for i in range(1, 6))
 """Coefficients of the power series."""
 
 
@@ -99,7 +99,7 @@ def moved(
 
 
 class Course(NamedTuple):
-    """Where a vehicle is and where it goes, before it moves; fields as of ``Boat``."""
+    """Where a vehicle is and where it goes, before it moves; fields as of ``Boat``, and the mean of two directions."""
 
     x: float
     y: float
@@ -110,6 +110,8 @@ class Course(NamedTuple):
     cosine: float
     vel_x: float
     vel_y: float
+    mean_sine: float
+    mean_cosine: float
 
 
 @part
@@ -125,7 +127,7 @@ def steered(boat: Boat, speed: float, turn: float, guarded: bool, team: int, rul
         rules: the game's constants.
     """
     home_x, home_y = home(team, rules)
-    sine, cosine = rotated(boat.sine, boat.cosine, turn * TO_RADIANS)
+    mean_sine, mean_cosine, sine, cosine = rotated(boat.sine, boat.cosine, turn * TO_RADIANS)
     vel_x, vel_y = speed * sine, speed * cosine
     if rules.float32:
         vel_x, vel_y = single(vel_x), single(vel_y)
@@ -137,15 +139,21 @@ def steered(boat: Boat, speed: float, turn: float, guarded: bool, team: int, rul
             speed, heading, sine, cosine = slid(vel_x, vel_y, normal_x, normal_y)
         else:
             heading, sine, cosine = turned_by(boat, turn)
-        return Course(x, y, speed, False, heading, sine, cosine, math.nan, math.nan)
+        mean_sine, mean_cosine = midway(sine + boat.sine, cosine + boat.cosine)
+        return Course(x, y, speed, False, heading, sine, cosine, math.nan, math.nan, mean_sine, mean_cosine)
     if not rules.float32:
-        return Course(boat.x, boat.y, speed, False, wrapped(boat.heading + turn), sine, cosine, math.nan, math.nan)
+        heading = wrapped(boat.heading + turn)
+        return Course(boat.x, boat.y, speed, False, heading, sine, cosine, math.nan, math.nan, mean_sine, mean_cosine)
     if speed > 0.1:
-        scale = 1.0 / math.sqrt(vel_x * vel_x + vel_y * vel_y)
+        # Rounding turned the velocity by ``off`` rad, below 1e-7: the direction by that, the mean by half of it
+        off = (vel_x * cosine - vel_y * sine) / speed
+        near = 1.0 - 0.5 * off * off
+        sine, cosine = near * sine + off * cosine, near * cosine - off * sine
+        mean_sine, mean_cosine = mean_sine + 0.5 * off * mean_cosine, mean_cosine - 0.5 * off * mean_sine
         speed = length32(vel_x, vel_y)
-        return Course(boat.x, boat.y, speed, True, boat.heading, vel_x * scale, vel_y * scale, vel_x, vel_y)
+        return Course(boat.x, boat.y, speed, True, boat.heading, sine, cosine, vel_x, vel_y, mean_sine, mean_cosine)
     heading, sine, cosine = turned_by(boat, turn)
-    return Course(boat.x, boat.y, speed, False, heading, sine, cosine, math.nan, math.nan)
+    return Course(boat.x, boat.y, speed, False, heading, sine, cosine, math.nan, math.nan, mean_sine, mean_cosine)
 
 
 @part
@@ -155,8 +163,7 @@ def way_of(boat: Boat, course: Course, rules: Rules) -> tuple[float, float, floa
     if course.is_f32 and boat.speed_is_f32:
         both_speeds = single(both_speeds)
     speed = both_speeds / 2.0
-    sine, cosine = midway(course.sine + boat.sine, course.cosine + boat.cosine)
-    dx, dy = sine * speed * rules.tau_s, cosine * speed * rules.tau_s
+    dx, dy = course.mean_sine * speed * rules.tau_s, course.mean_cosine * speed * rules.tau_s
     doubt = 3e-15 * abs(speed) * rules.tau_s
     if rules.float32 and not (course.is_f32 and is_certain(course.x, dx, doubt) and is_certain(course.y, dy, doubt)):
         old = direction_of(heading_now(boat.heading, boat.vel_x, boat.vel_y))
@@ -205,18 +212,30 @@ def single(value: float) -> float:
 
 
 @part
-def rotated(sine: float, cosine: float, angle: float) -> tuple[float, float]:
-    """Returns sine and cosine of a heading after a turn by ``angle`` rad, clockwise positive."""
-    square = angle * angle
-    if square < 0.07:  # rad²: all turns of a sub-step of 0.1 s; the first terms left out of the series are below 1e-17
+def rotated(sine: float, cosine: float, angle: float) -> tuple[float, float, float, float]:
+    """Returns sine and cosine of a heading after half a turn by ``angle`` rad, clockwise positive, and after all of it.
+
+    What they lack to the length 1 is made good, so that it does not add up.
+    """
+    half = 0.5 * angle
+    square = half * half
+    if (
+        square < 0.0175
+    ):  # rad²: all turns of a sub-step of 0.1 s; the first terms left out of the series are below 1e-17
         s = 1.0 + square * (SIN1 + square * (SIN2 + square * (SIN3 + square * (SIN4 + square * SIN5))))
-        s *= angle
-        c = 1.0 + square * (
-            COS1 + square * (COS2 + square * (COS3 + square * (COS4 + square * (COS5 + square * COS6))))
-        )
+        s *= half
+        c = 1.0 + square * (COS1 + square * (COS2 + square * (COS3 + square * (COS4 + square * COS5))))
     else:
-        s, c = math.sin(angle), math.cos(angle)
-    return sine * c + cosine * s, cosine * c - sine * s
+        s, c = math.sin(half), math.cos(half)
+    scale = 1.5 - 0.5 * (sine * sine + cosine * cosine)
+    sine, cosine = scale * sine, scale * cosine
+    double, rest = 2.0 * s * c, 1.0 - 2.0 * s * s
+    return (
+        sine * c + cosine * s,
+        cosine * c - sine * s,
+        sine * rest + cosine * double,
+        cosine * rest - sine * double,
+    )
 
 
 @part

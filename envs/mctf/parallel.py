@@ -15,7 +15,8 @@ from mctf.lanes import direct, empty_lanes, empty_scratch, look, start_lanes, st
 from mctf.rewards import make_reward
 from mctf.rules import Rules, make_rules
 from mctf.state import CAPTURES, EVENTS, GRABS, TAGS
-from mctf.view import allowed_action, check_word, is_allowed, make_view
+from mctf.view import allowed_action, is_allowed, make_view
+from mctf.words import check_word
 
 Observations = dict[str, NDArray[np.float32]]
 Infos = dict[str, dict[str, int]]
@@ -139,8 +140,11 @@ class MctfEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         if unknown:
             raise ValueError(f"options may have 'state' only, but has {unknown[0]!r}.")
         if start is not None:
+            before = snapshot.saved(self._lanes.state, 0, self.rules) if self._seeded else None
             self.restore(start)
             if not self.agents:
+                if before is not None:
+                    self.restore(before)
                 raise ValueError("options['state'] must be of a game that goes on, but is of one that is over.")
             if stream is not None:
                 self._lanes.state.stream[0] = stream
@@ -170,13 +174,17 @@ class MctfEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             actions: one of each agent's action space.
 
         Raises:
-            RuntimeError: there is no game, or it is over.
+            RuntimeError: there is no game, or it is over, or the reward function failed.
             ValueError: an agent or its action is not allowed; no step is played.
         """
         if not self.agents:
             raise RuntimeError("step must come after reset and before the end of the game, but there is no game now.")
         self._take(actions)
         self._step(self._lanes, 0, 1, self._view, self.rules, self._reward, self._scratch)
+        if not np.isfinite(self._lanes.paid).all():
+            raise RuntimeError(
+                f"reward must be finite, but the function failed or gave {self._lanes.paid[0].tolist()}."
+            )
         end, agents = self._lanes.end[0], self.agents
         if end != RUNNING:
             self.agents = []

@@ -3,7 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from mctf.batch import checked_count, checked_seeds, chunks
 from mctf.compiled import kernel
@@ -15,7 +15,7 @@ from mctf.start import reset
 from mctf.state import State, empty
 
 
-def play_scripted(policies: NDArray[np.int64], seeds: NDArray[np.uint64], rules: Rules, threads: int = 1) -> State:
+def play_scripted(policies: ArrayLike, seeds: ArrayLike, rules: Rules, threads: int = 1) -> State:
     """Plays one game with each row of ``policies`` and returns the state after the last step of each.
 
     Args:
@@ -27,7 +27,12 @@ def play_scripted(policies: NDArray[np.int64], seeds: NDArray[np.uint64], rules:
     Raises:
         ValueError: a shape or a policy does not fit, or threads are none.
     """
-    policies = np.ascontiguousarray(policies, dtype=np.int64)
+    if not isinstance(rules, Rules):
+        raise ValueError(f"rules must be of make_rules, but is {rules!r}.")
+    given = np.asarray(policies)
+    if given.dtype.kind not in "iu":
+        raise ValueError(f"policies must be whole numbers, places in scripted.NAMES, but is of {given.dtype}.")
+    policies = np.ascontiguousarray(given, dtype=np.int64)
     vehicles = rules.blue_size + rules.red_size
     if policies.ndim != 2 or policies.shape[1] != vehicles:
         raise ValueError(f"policies must have shape (games, {vehicles}), but has {policies.shape}.")

@@ -3,7 +3,6 @@
 In the first step of a game nothing counts as new, as there is nothing to compare with.
 """
 
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -11,13 +10,14 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cfunc, types
+from numba import cfunc, njit, types
 from numpy.typing import NDArray
 
 from mctf.compiled import kernel, part
 from mctf.geometry import apart, home, team_of
 from mctf.rules import Rules
 from mctf.state import State
+from mctf.words import did_you_mean
 
 TERMS = (
     "team_captured",  # the team captured in this step
@@ -123,57 +123,73 @@ def nothing(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDAr
 
 
 def make_reward(
-    reward: str | Callable[..., float] = "custom_rew2", weights: Mapping[str, float] | None = None
+    reward: str | Callable[..., float] = "custom_rew2", weights: Mapping[str, float | None] | None = None
 ) -> Reward:
     """Returns a reward.
 
     Args:
         reward: a name of ``WEIGHTS``, or a function of one's own, or where to import it: ``module:function``. It is
             called as ``own(terms, before, after)`` for every vehicle and step and is compiled, so it must be of
-            numbers and numpy only.
-        weights: of terms, by their names in ``TERMS``, in place of the reward's; 0 switches a term off.
+            numbers and numpy only. A call that fails is worth NaN, which whoever plays the game must not accept.
+        weights: of terms, by their names in ``TERMS``, in place of the reward's; 0 switches a term off, None leaves it.
 
     Raises:
         ValueError: there is no such reward or term, or the function cannot be compiled.
     """
-    weights = dict(weights or {})
-    for term, weight in weights.items():
+    given = {term: weight for term, weight in (weights or {}).items() if weight is not None}
+    for term, weight in given.items():
         if term not in TERMS:
-            raise ValueError(f"weights must be of {TERMS}, but has {term!r}.{_nearest(term, TERMS)}")
-        if isinstance(weight, bool | str) or not math.isfinite(weight):
-            raise ValueError(f"weights[{term!r}] must be a finite number, but is {weight!r}.")
+            raise ValueError(f"reward_weights must be of {TERMS}, but has {term!r}.{did_you_mean(term, TERMS)}")
+        if isinstance(weight, bool) or not isinstance(weight, int | float | np.number) or not math.isfinite(weight):
+            raise ValueError(f"reward_weights[{term!r}] must be a finite number, but is {weight!r}.")
     named = WEIGHTS.get(reward, {}) if isinstance(reward, str) else {}
-    numbers = np.array([weights.get(term, named.get(term, 0.0)) for term in TERMS], np.float64)
+    numbers = np.array([given.get(term, named.get(term, 0.0)) for term in TERMS], np.float64)
     if isinstance(reward, str) and reward in WEIGHTS:
-        own: Callable[..., float] = progress if reward == "custom_rew" else nothing
-    else:
-        own = _imported(reward) if isinstance(reward, str) else reward
+        own = progress if reward == "custom_rew" else nothing
+        return Reward(numbers, own is progress, cfunc(OWN_SIGNATURE, nogil=True)(own))
+    own = _imported(reward) if isinstance(reward, str) else reward
+    if not callable(own):
+        raise ValueError(f"reward must be one of {tuple(WEIGHTS)}, a function or module:function, but is {reward!r}.")
+    return Reward(numbers, True, _compiled(own))
+
+
+def _compiled(own: Callable[..., float]) -> Any:
+    """Returns a function as machine code that gives NaN where it fails."""
     try:
-        compiled = cfunc(OWN_SIGNATURE, nogil=True)(own)
+        checked = njit(nogil=True, boundscheck=True)(own)
+
+        def guarded(terms, before, after):  # type: ignore[no-untyped-def]
+            try:
+                return np.float64(checked(terms, before, after))
+            except Exception:
+                return np.nan
+
+        return cfunc(OWN_SIGNATURE, nogil=True)(guarded)
     except Exception as error:  # Numba raises many kinds, for anything that a user may write
-        said = str(error).strip().splitlines()[-1]
-        raise ValueError(f"reward must be a function that Numba compiles, but {own!r} is not: {said}") from error
-    return Reward(numbers, own is not nothing, compiled)
+        said = [line for line in str(error).splitlines() if line.strip() and not line.startswith(("Failed", "During"))]
+        name = getattr(own, "__qualname__", repr(own))
+        raise ValueError(
+            f"reward must be a function(terms, before, after) of numbers that Numba compiles, but {name} is not: "
+            f"{said[0].strip() if said else error}"
+        ) from error
 
 
 def _imported(path: str) -> Callable[..., float]:
     module, colon, name = path.partition(":")
     if not colon:
         raise ValueError(
-            f"reward must be one of {tuple(WEIGHTS)} or module:function, but is {path!r}.{_nearest(path, WEIGHTS)}"
+            f"reward must be one of {tuple(WEIGHTS)} or module:function, but is {path!r}.{did_you_mean(path, WEIGHTS)}"
         )
     try:
         found = getattr(import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f"reward must be importable, but {path!r} is not: {error}.") from error
+    except Exception as error:  # whatever the user's module does
+        raise ValueError(
+            f"reward must be importable, but {path!r} is not: {type(error).__name__}: {error}. "
+            "The command looks for modules in the current folder, too."
+        ) from error
     if not callable(found):
         raise ValueError(f"reward must be a function, but {path!r} is {found!r}.")
     return found
-
-
-def _nearest(given: str, allowed: Any) -> str:
-    near = difflib.get_close_matches(given, list(allowed), 1)
-    return f" Did you mean {near[0]}?" if near else ""
 
 
 @kernel

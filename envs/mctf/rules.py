@@ -3,12 +3,14 @@
 ``make_rules`` is the border: what it returns is valid, and no kernel checks it again.
 """
 
-import difflib
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from mctf.profiles import PROFILES, WORDS
+from mctf.words import check_word, did_you_mean
 
 ACTIONS = 17
 """Number of discrete actions: 8 turns at full speed, 8 at half speed, and stop."""
@@ -146,11 +148,10 @@ def make_rules(
     Raises:
         ValueError: an argument is not allowed; the message names it, what is allowed and what was given.
     """
-    if profile not in PROFILES:
-        raise ValueError(f"profile must be one of {tuple(PROFILES)}, but is {profile!r}.{_nearest(profile, PROFILES)}")
+    check_word("profile", profile, PROFILES)
     unknown = [name for name in given if name not in PROFILES[profile]]
     if unknown:
-        raise ValueError(f"{unknown[0]} is no rule.{_nearest(unknown[0], PROFILES[profile])}")
+        raise ValueError(f"{unknown[0]} is no rule.{did_you_mean(unknown[0], PROFILES[profile])}")
     settings = dict(PROFILES[profile]) | {name: value for name, value in given.items() if value is not None}
     numbers = _numbers(settings)
     words = {name: _word(name, settings[name]) for name in WORDS}
@@ -166,6 +167,10 @@ def make_rules(
         untag_radius_m = numbers["catch_radius_m"]
         if switches["untag_at_keepout"]:
             untag_radius_m = max(untag_radius_m, numbers["flag_keepout_m"] + 1.0)
+    if numbers["catch_radius_m"] >= width / 2.0:
+        raise ValueError(
+            f"catch_radius_m must be < {width / 2.0:g}, half of world_size_m[0], but is {numbers['catch_radius_m']:g}."
+        )
     sizes = _sizes(team_size)
     left, right = (width / 8.0, height / 2.0), (7.0 * width / 8.0, height / 2.0)
     homes = (right, left) if first["blue_side"] else (left, right)
@@ -225,8 +230,8 @@ def _check_field(width: float, height: float, margin: float) -> None:
     for name, extent, homes in (("world_size_m[0]", width, 8), ("world_size_m[1]", height, 2)):
         if not extent / homes > margin:
             raise ValueError(
-                f"{name} must be > {homes * margin:g}, {homes} times agent_radius_m and the keep-out circle, "
-                f"so that a vehicle fits between its flag and the wall, but is {extent:g}."
+                f"{name} must be > {homes * margin:g}, {homes} times agent_radius_m and the keep-out circle together "
+                f"({margin:g} m), so that a vehicle fits between its flag and the wall, but is {extent:g}."
             )
 
 
@@ -257,14 +262,8 @@ def _sizes(team_size: Any) -> tuple[int, int]:
     return sizes
 
 
-def _nearest(given: Any, allowed: Any) -> str:
-    near = difflib.get_close_matches(str(given), list(allowed), 1)
-    return f" Did you mean {near[0]}?" if near else ""
-
-
 def _word(name: str, value: Any) -> int:
-    if str(value) not in WORDS[name]:
-        raise ValueError(f"{name} must be one of {WORDS[name]}, but is {value!r}.{_nearest(value, WORDS[name])}")
+    check_word(name, str(value), WORDS[name])  # a version may be given as a number
     return WORDS[name].index(str(value))
 
 
@@ -290,6 +289,6 @@ def _count(name: str, value: Any) -> int:
 
 
 def _switch(name: str, value: Any) -> bool:
-    if value not in (True, False):
+    if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} must be True or False, but is {value!r}.")
     return bool(value)

@@ -15,6 +15,8 @@ def reset(state: State, b: int, rules: Rules) -> None:
 
     With ``STARTS_RANDOM`` places and headings are drawn from ``state.stream[b]``; seed it before.
     """
+    if rules.pid_reset:
+        forget(state, b, rules)
     for v in range(rules.blue_size + rules.red_size):
         place(state, b, v, rules)
         for axis in range(2):
@@ -24,9 +26,6 @@ def reset(state: State, b: int, rules: Rules) -> None:
         state.speed[b, v] = 0.0
         state.speed_is_f32[b, v] = False
         state.thrust[b, v] = 0.0
-        if rules.pid_reset:
-            state.heading_error_prev[b, v] = 0.0
-            state.heading_error_known[b, v] = False
         state.has_flag[b, v] = False
         state.on_own_side[b, v] = True
         state.is_tagged[b, v] = False
@@ -50,6 +49,14 @@ def reset(state: State, b: int, rules: Rules) -> None:
             state.score[b, team, kind] = 0
     state.time[b] = 0.0
     state.steps[b] = 0
+
+
+@part
+def forget(state: State, b: int, rules: Rules) -> None:
+    """Empties the controllers' memory of game ``b``, as in a new environment object; call it before ``reset``."""
+    for v in range(rules.blue_size + rules.red_size):
+        state.heading_error_prev[b, v] = 0.0
+        state.heading_error_known[b, v] = False
 
 
 @part

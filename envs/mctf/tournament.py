@@ -1,7 +1,6 @@
 """Plays the games of a table of outcomes between teams of fixed policies, and finds those that end otherwise."""
 
 import csv
-import difflib
 import re
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +15,7 @@ from mctf.replaying import FORESEEN
 from mctf.rules import Rules, make_rules
 from mctf.scripted import NAMES
 from mctf.state import CAPTURES, GRABS, TAGS
+from mctf.words import did_you_mean
 
 OUTCOMES = (
     "blue_captures",
@@ -103,6 +103,6 @@ def _check_row(line: int, row: list[str], columns: list[str]) -> None:
             if not re.fullmatch(r"[0-9]{1,9}", value):
                 raise TraceError(f"has {value!r} as {column} in line {line}; it must be a whole number >= 0.")
         elif value not in FORESEEN:
-            near = difflib.get_close_matches(value, FORESEEN, 1)
-            hint = f"; did you mean {near[0]}?" if near else "."
-            raise TraceError(f"has {value!r} as {column} in line {line}; it must be one of {', '.join(FORESEEN)}{hint}")
+            meant = did_you_mean(value, FORESEEN)
+            known = ", ".join(FORESEEN)
+            raise TraceError(f"has {value!r} as {column} in line {line}; it must be one of {known}.{meant}")

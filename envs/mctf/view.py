@@ -1,7 +1,5 @@
 """How learners act and what they see: the kinds of actions and observations of the environment and the batch."""
 
-import difflib
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +8,7 @@ from numpy.typing import NDArray
 from mctf.commands import FIELD_POINTS
 from mctf.observe import ranges
 from mctf.rules import ACTIONS, Rules
+from mctf.words import check_word
 
 ACTION_KINDS = ("discrete", "continuous", "field_points")
 OBSERVATION_KINDS = ("normalised", "raw")
@@ -54,15 +53,6 @@ def make_view(actions: str, observations: str, rules: Rules) -> View:
         normalised=observations == "normalised",
         scale=ranges(rules),
     )
-
-
-def check_word(name: str, given: Any, allowed: Iterable[str]) -> None:
-    """Raises a ValueError that names the nearest word, unless ``given`` is one of ``allowed``."""
-    words = tuple(allowed)
-    if not isinstance(given, str) or given not in words:
-        near = difflib.get_close_matches(str(given).lower(), words, 1, 0.4)
-        meant = f" Did you mean {near[0]}?" if near else ""
-        raise ValueError(f"{name} must be one of {words}, but is {given!r}.{meant}")
 
 
 def limits(rules: Rules) -> tuple[float, float]:

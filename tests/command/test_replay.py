@@ -99,7 +99,7 @@ def test_a_run(berteam, run, tmp_path):
 
 def test_a_run_that_rated_nothing(berteam, run):
     (run / "elo.csv").unlink()
-    assert "rated too few teams to choose one; name it: blue=" in berteam("replay", "run", code=2).stderr
+    assert "rated too few teams to choose one" in berteam("replay", "run", code=2).stderr
     berteam("replay", "run", "blue=0-1", "red=1-2")
     for folder in (run / "checkpoint").iterdir():
         (folder / "tensors.safetensors").unlink()
@@ -122,7 +122,10 @@ def test_a_run_that_rated_nothing(berteam, run):
         (["blue=0-1", "red=0-1", "on_exists=resume"], "on_exists must be one of error, overwrite"),
         (["blue=0-1", "red=0-1", "-m"], "takes no --multirun"),
         (["bleu=0-1", "red=0-1"], "bleu is no key of this configuration. Did you mean blue"),
-        (["env=rps", "blue=0-1", "red=0-1"], "Only games of env=mctf can be filmed, but this one is env=rps"),
+        (
+            ["env=rps", "blue=0-1", "red=0-1"],
+            "Only games of env=mctf and .* can be filmed, but this one is env=rps",
+        ),
         (["nowhere"], "nowhere is no folder of a run"),
         (["nowhere", "run=elsewhere"], "The run is named twice"),
         (["run=nowhere", "team_size=3"], "team_size has no effect with run=nowhere"),

@@ -277,3 +277,21 @@ def test_a_job_that_fails_does_not_end_the_sweep(berteam, tmp_path, monkeypatch)
     assert "MemoryError: no room" in table.error[1]
     assert table.expected_elo.isna().tolist() == [False, True, False]
     assert "no room" in (tmp_path / "sweep" / "1" / "error.txt").read_text()
+
+
+def test_a_reward_of_ones_own_lies_in_the_current_folder(process, tmp_path):
+    (tmp_path / "mine.py").write_text("def pay(terms, before, after):\n    return terms[12] - before[3] + after[3]\n")
+    words = ["selector=uniform", "population=ppo6", *TINY, "learner.n_steps=32", "learner.minibatch_size=16"]
+    process("train", *words, "env.reward=mine:pay", "out=mine")
+    process("train", *words, "env.reward=sparse", "out=sparse")
+    losses = [read(tmp_path / run, "learning").loss.dropna() for run in ("mine", "sparse")]
+    assert len(losses[0]) == len(losses[1]) > 0
+    assert not losses[0].equals(losses[1])
+    process("resume", "mine", "epochs=5")
+
+
+def test_a_reward_that_is_no_number_ends_the_run(process, tmp_path):
+    (tmp_path / "mine.py").write_text("def pay(terms, before, after):\n    return 1.0 / (terms[0] - terms[0])\n")
+    words = ["selector=uniform", "population=ppo6", *TINY, "env.reward=mine:pay", "out=run"]
+    said = process("train", *words, code=3).stderr
+    assert "env.reward must give finite numbers, but failed or did not in game 0, of seed" in said

@@ -1,7 +1,10 @@
 import numpy as np
 import pytest
+from numba import njit
 
 from berteam_cli.acting import fixed_policies, joined
+from berteam_cli.env.base import blank_results
+from berteam_cli.env.mctf import blank_scratch, settle
 from berteam_cli.games import pairings, seeds_of
 from mctf import play_scripted
 from mctf.parallel import parallel_env
@@ -60,3 +63,39 @@ def test_the_random_policy_differs_from_game_to_game_and_not_from_run_to_run():
 def test_the_fingerprint_tells_rules_apart_and_not_rewards():
     assert mctf().env.fingerprint() != mctf(flag_keepout_m=6.0).env.fingerprint()
     assert mctf().env.fingerprint() == mctf(reward="sparse").env.fingerprint()
+
+
+def test_a_game_forgets_the_one_before_whatever_pid_reset_is():
+    """The game before in the same thread would decide it otherwise, and with it the number of games."""
+    games = mctf(1, pid_reset=False, first_kick=False, max_time_s=40.0)
+    players = random_networks(4, games.env, seed=1)
+    lineups = pairings(np.array([[0, 1]] * 16), np.array([[2, 3]] * 16))
+    _, together = games.play(players, lineups, 3, record=True)
+    results = blank_results(games.env, 16, record=True)
+    for b in range(16):
+        games.env.play(range(b, b + 1), lineups.teams.reshape(16, 4), players, seeds_of(3, 16), results)
+    np.testing.assert_array_equal(together.rewards[:, :, :40], results.rewards[:, :, :40])
+    np.testing.assert_array_equal(together.observations[:, :, :41], results.observations[:, :, :41])
+
+
+@pytest.mark.parametrize(
+    ("rules", "captures", "scores"),
+    [
+        ({"tie_at_max": "red", "capture_first_only": False}, (1, 1), (0.0, 1.0)),
+        ({"tie_at_max": "draw", "capture_first_only": False}, (1, 1), (0.5, 0.5)),
+        ({"max_score": 3, "max_time_s": 1.0}, (2, 1), (1.0, 0.0)),
+        ({"max_score": 3, "max_time_s": 1.0}, (1, 1), (0.5, 0.5)),
+    ],
+)
+def test_the_score_is_as_the_rules_end_the_game(rules, captures, scores):
+    env = mctf(**rules).env
+    results, scratch = blank_results(env, 1, record=False), blank_scratch(env, fixed_policies([0]))
+    scratch.state.score[0, :, CAPTURES] = captures
+    scratch.state.time[0] = env.rules.max_time_s
+
+    @njit
+    def settled(state, rules, results):
+        settle(state, rules, 0, results)
+
+    settled(scratch.state, env.rules, results)
+    assert tuple(results.scores[0]) == scores

@@ -175,7 +175,7 @@ def table(tmp_path, change):
         (lambda text: text.replace("steps", "length", 1), "; they must be 'blue_0,blue_1,red_0,red_1,blue_captures,"),
         (lambda text: text.replace(",263,", ",many,", 1), "has 'many' as steps in line 2; it must be a whole number"),
         (lambda text: text.replace(",263,", ",-263,", 1), "has '-263' as steps in line 2; it must be a whole number"),
-        (lambda text: text.replace("attack_easy", "attack_esay", 1), "defend_hard; did you mean attack_easy?"),
+        (lambda text: text.replace("attack_easy", "attack_esay", 1), "defend_hard. Did you mean attack_easy?"),
         (lambda text: text.replace("attack_easy", "random", 1), "has 'random' as blue_0 in line 2; it must be one of"),
         (lambda text: text.replace("263", "2\x0063", 1), " in line "),
         (lambda text: text.replace("attack_easy", '"attack_easy', 1), "is no csv text (unexpected end of data)"),

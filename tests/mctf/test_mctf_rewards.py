@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from mctf.rewards import TERMS, make_reward, rewards
+from mctf.batch import Batch
+from mctf.parallel import parallel_env
+from mctf.rewards import GRABBED, TERMS, make_reward, rewards
+from mctf.rules import make_rules
 
 CUSTOM_REW2, CUSTOM_REW, SPARSE = map(make_reward, ("custom_rew2", "custom_rew", "sparse"))
 
@@ -103,3 +106,65 @@ def test_progress(game, carries, nearer, reward):
     assert earned(game, CUSTOM_REW)[0] == pytest.approx(reward)
     game.put(0, 100.0, 50.0, is_tagged=True)
     assert earned(game, CUSTOM_REW)[0] == 0.0
+
+
+def test_weights_replace_those_of_a_reward(game):
+    put(game, has_flag=0, pickup=0)
+    assert earned(game, make_reward("custom_rew2", {"grabbed": 7.0})) == [7.0, 0.0, -1.0, -1.0]
+    assert earned(game, make_reward("custom_rew2", {"grabbed": 0, "carries": 0.5, "tags": None})) == [
+        0.5,
+        0.0,
+        -1.0,
+        -1.0,
+    ]
+
+
+def test_a_function_of_ones_own_sees_terms_and_observations(game):
+    def own(terms, before, after):
+        return terms[GRABBED] + 10.0 * before[0] + 100.0 * after[1]
+
+    put(game, has_flag=0, pickup=0)
+    reward = make_reward(own, {"carries": 0.25})
+    before, after, out = np.full((4, 45), 2.0), np.full((4, 45), 3.0), np.zeros(4)
+    rewards(reward, game.state, 0, game.rules, before, after, np.zeros(len(TERMS)), out)
+    assert out.tolist() == [1.0 + 20.0 + 300.0 + 0.25, 320.0, 320.0, 320.0]
+
+
+def fails(terms, before, after):
+    return before[10**9]
+
+
+def divides(terms, before, after):
+    return 1.0 / (terms[0] - terms[0])
+
+
+@pytest.mark.parametrize("own", [fails, divides, lambda terms, before, after: np.nan])
+def test_a_function_that_fails_is_noticed(own):
+    env = parallel_env(reward=own)
+    env.reset()
+    with pytest.raises(RuntimeError, match="reward must be finite"):
+        env.step(dict.fromkeys(env.agents, 4))
+    batch = Batch(2, make_rules(), reward=own)
+    batch.start([1, 2])
+    with pytest.raises(RuntimeError, match=r"reward must be finite.*in game 0"):
+        batch.step(np.zeros((2, 4), int))
+
+
+@pytest.mark.parametrize(
+    ("reward", "weights", "said"),
+    [
+        ("sparce", None, "Did you mean sparse"),
+        ("nowhere:pay", None, "importable.*No module named 'nowhere'"),
+        ("math:nothing", None, "importable.*no attribute"),
+        ("math:pi", None, "must be a function, but"),
+        (lambda terms, before, after: open("x"), None, "Numba compiles, but .*lambda.* is not: .*open"),  # noqa: SIM115
+        (lambda terms: 1.0, None, r"function\(terms, before, after\)"),
+        (None, None, "must be one of"),
+        ("sparse", {"tag": 1.0}, "Did you mean tags"),
+        ("sparse", {"tags": np.nan}, "finite number"),
+        ("sparse", {"tags": [1]}, "finite number"),
+    ],
+)
+def test_what_is_no_reward_is_refused(reward, weights, said):
+    with pytest.raises(ValueError, match=said):
+        make_reward(reward, weights)

@@ -1,5 +1,6 @@
 import math
 
+import numpy as np
 import pytest
 
 import mctf
@@ -22,7 +23,7 @@ def test_defaults_are_the_papers():
 
 def test_types_are_always_the_same():  # else every mixture would be compiled anew
     odd = make_rules(
-        "clean", 2.0, [[100, 40], [20, 40]], 1, 9, world_size_m=[160, 80], max_score=3.0, oob_counts_as_tag=0
+        "clean", 2.0, [[100, 40], [20, 40]], 1, 9, world_size_m=[160, 80], max_score=3.0, oob_counts_as_tag=np.False_
     )
     assert [type(value) for value in odd] == [type(value) for value in make_rules()]
 
