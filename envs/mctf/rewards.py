@@ -146,7 +146,7 @@ def make_reward(
     numbers = np.array([given.get(term, named.get(term, 0.0)) for term in TERMS], np.float64)
     if isinstance(reward, str) and reward in WEIGHTS:
         own = progress if reward == "custom_rew" else nothing
-        return Reward(numbers, own is progress, cfunc(OWN_SIGNATURE, nogil=True)(own))
+        return Reward(numbers, own is progress, cfunc(OWN_SIGNATURE, nogil=True, cache=True)(own))
     own = _imported(reward) if isinstance(reward, str) else reward
     if not callable(own):
         raise ValueError(f"reward must be one of {tuple(WEIGHTS)}, a function or module:function, but is {reward!r}.")
