@@ -6,12 +6,13 @@ which other games or members happen to be computed beside it.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
+
+from berteam_cli.arithmetic import exp, multiply_row, tanh
 
 FIXED, SAMPLED, GREEDY = 0, 1, 2  # kinds of policy
 DEEPEST = 6  # hidden layers a network may have
@@ -88,7 +89,7 @@ def joined(tables: list[Policies]) -> Policies:
     return Policies(*columns, weights=np.concatenate(weights))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def act(policies: Policies, k: int, observation: np.ndarray, work: np.ndarray, chance: float, choice: float) -> int:
     """Returns the action of policy ``k``, a network, on one observation.
 
@@ -96,65 +97,63 @@ def act(policies: Policies, k: int, observation: np.ndarray, work: np.ndarray, c
         policies: the table.
         k: row of a SAMPLED or GREEDY policy.
         observation: (O,) float32.
-        work: (2, at least the widest layer) float32 scratch; changed.
+        work: (2 * widest layer,) float32 scratch, or longer; changed.
         chance: in [0, 1), decides whether a GREEDY policy explores.
         choice: in [0, 1), decides which action is drawn.
     """
-    sizes, weights = policies.sizes[k], policies.weights[k]
-    x, y = work[0], work[1]
-    wide = sizes[0]
+    sizes, weights = policies.sizes, policies.weights
+    x, y = 0, len(work) // 2  # places in work where a layer's inputs and outputs begin
+    wide = int(sizes[k, 0])
     for i in range(wide):
-        x[i] = observation[i]
-    at, layer = 0, 1
-    while layer < len(sizes) and sizes[layer] > 0:
-        out = sizes[layer]
+        work[i] = observation[i]
+    at, layer, depth = k * weights.shape[1], 1, sizes.shape[1]
+    while layer < depth and sizes[k, layer] > 0:
+        out = int(sizes[k, layer])
         bias = at + wide * out
-        for j in range(out):
-            y[j] = weights[bias + j]
-        for i in range(wide):  # one input at a time: the inner loop runs over neighbours in memory
-            x_i = x[i]
-            for j in range(out):
-                y[j] += x_i * weights[at + j]
-            at += out
-        at = bias + out
-        last = layer + 1 == len(sizes) or sizes[layer + 1] == 0
-        if not last:
+        multiply_row(work, x, weights, at, bias, work, y, wide, out)
+        if layer + 1 < depth and sizes[k, layer + 1] > 0:
             if policies.tanh[k]:
-                for j in range(out):
-                    y[j] = math.tanh(y[j])
+                tanh(work, y, out)
             else:
                 for j in range(out):
-                    y[j] = max(y[j], np.float32(0.0))
+                    work[y + j] = max(work[y + j], np.float32(0.0))
         x, y = y, x
-        wide = out
+        wide, at = out, bias + out
         layer += 1
     if policies.kind[k] == GREEDY:
         if chance < policies.epsilon[k]:
             return min(int(choice * wide), wide - 1)
-        return highest(x, wide)
-    return drawn(x, wide, choice)
+        return highest(work, x, wide)
+    return drawn(work, x, wide, choice)
 
 
 @njit(cache=True, nogil=True)
-def highest(values: np.ndarray, count: int) -> int:
-    """Returns the first index of the largest of ``values[:count]``."""
+def highest(values: np.ndarray, first: int, count: int) -> int:
+    """Returns the first index of the largest of ``values[first : first + count]``, counted from ``first``."""
     best = 0
     for j in range(1, count):
-        if values[j] > values[best]:
+        if values[first + j] > values[first + best]:
             best = j
     return best
 
 
 @njit(cache=True, nogil=True)
-def drawn(logits: np.ndarray, count: int, choice: float) -> int:
-    """Returns an index drawn from softmax(``logits[:count]``) by the number ``choice`` in [0, 1)."""
-    top = logits[highest(logits, count)]
+def drawn(logits: np.ndarray, first: int, count: int, choice: float) -> int:
+    """Returns an index drawn from softmax(``logits[first : first + count]``) by the number ``choice`` in [0, 1).
+
+    Changes these ``logits``.
+    """
+    likeliest = highest(logits, first, count)
+    top = logits[first + likeliest]
+    for j in range(first, first + count):
+        logits[j] -= top
+    exp(logits, first, count)
     total = 0.0
-    for j in range(count):
-        total += math.exp(logits[j] - top)
+    for j in range(first, first + count):
+        total += logits[j]
     left = choice * total
     for j in range(count):
-        left -= math.exp(logits[j] - top)
+        left -= logits[first + j]
         if left < 0.0:
             return j
-    return highest(logits, count)  # rounding left a crumb behind the last action
+    return likeliest  # rounding left a crumb behind the last action

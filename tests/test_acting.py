@@ -25,7 +25,7 @@ def torch_outputs(parts, k, observation, activation):
 
 
 def work(policies):
-    return np.zeros((2, policies.sizes.max()), dtype=np.float32)
+    return np.zeros(2 * policies.sizes.max(), dtype=np.float32)
 
 
 @given(st.integers(0, 2**32), st.booleans(), st.sampled_from([(5,), (8, 8), (3, 9, 4)]))
@@ -75,8 +75,8 @@ def test_joined_tables_act_as_each_alone():
 
 @pytest.mark.parametrize(("choice", "action"), [(0.0, 0), (0.24, 0), (0.26, 1), (0.999999, 1)])
 def test_drawn_by_hand(choice, action):
-    assert drawn(np.log(np.array([1.0, 3.0], dtype=np.float32)), 2, choice) == action
+    assert drawn(np.log(np.array([1.0, 3.0], dtype=np.float32)), 0, 2, choice) == action
 
 
 def test_drawn_survives_large_outputs():
-    assert drawn(np.array([-1e30, 3e38, 0], dtype=np.float32), 3, 0.999999999) == 1
+    assert drawn(np.array([-1e30, 3e38, 0], dtype=np.float32), 0, 3, 0.999999999) == 1

@@ -106,7 +106,7 @@ class Scratch(NamedTuple):
         actions: (V,).
         paid: (V,).
         terms: (len(TERMS),).
-        work: (2, widest layer) float32, for networks.
+        work: (2 * widest layer,) float32, for networks.
     """
 
     state: State
@@ -130,7 +130,7 @@ def blank_scratch(env: Mctf, policies: Policies) -> Scratch:
         actions=np.zeros(seen[0], dtype=np.int64),
         paid=np.zeros(seen[0]),
         terms=np.zeros(len(TERMS)),
-        work=np.zeros((2, policies.sizes.max() + 1), dtype=np.float32),
+        work=np.zeros(2 * (policies.sizes.max() + 1), dtype=np.float32),
     )
 
 

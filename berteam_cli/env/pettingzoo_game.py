@@ -93,7 +93,7 @@ def played(
     random.seed(seed >> 33)  # some environments draw from these two, whatever reset is given
     np.random.seed(seed >> 33)  # noqa: NPY002
     stream = np.array([seed], dtype=np.uint64)
-    work = np.zeros((2, max(int(policies.sizes.max()), 1)), dtype=np.float32)
+    work = np.zeros(2 * max(int(policies.sizes.max()), 1), dtype=np.float32)
     players = begun(env, facts, seed >> 33)
     steps = 0
     while steps < game.max_steps and any(player.playing for player in players):

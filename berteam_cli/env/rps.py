@@ -45,7 +45,7 @@ def play_games(
     size = vehicles // 2
     hands = np.zeros(vehicles, dtype=np.int64)
     seen = np.ones(1, dtype=np.float32)
-    work = np.zeros((2, policies.sizes.max() + 1), dtype=np.float32)
+    work = np.zeros(2 * (policies.sizes.max() + 1), dtype=np.float32)
     record = len(results.actions) > 0
     stream = np.zeros(1, dtype=np.uint64)
     for b in range(first, last):

@@ -68,11 +68,11 @@ def descend(adam: Adam, member: Trained, gradient: Singles) -> None:
     member.updates[0] += 1
     rate = np.float32(adam.learning_rate / (1.0 - MEAN_DECAY ** member.updates[0]))
     root = np.float32(math.sqrt(1.0 - SQUARE_DECAY ** member.updates[0]))
-    epsilon = np.float32(adam.epsilon)
+    rate, epsilon = rate * root, np.float32(adam.epsilon) * root  # m / (√v / root + ε), with one division
     keep, take = np.float32(SQUARE_DECAY), np.float32(1.0 - SQUARE_DECAY)
     weights, mean, square = member.weights, member.mean, member.square
     for j in range(len(gradient)):
         slope = gradient[j] * shorter
         mean[j] += (slope - mean[j]) * np.float32(1.0 - MEAN_DECAY)
         square[j] = square[j] * keep + slope * slope * take
-        weights[j] -= rate * mean[j] / (np.sqrt(square[j]) / root + epsilon)
+        weights[j] -= rate * mean[j] / (np.sqrt(square[j]) + epsilon)

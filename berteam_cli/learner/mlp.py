@@ -16,6 +16,8 @@ import numpy.typing as npt
 from numba import njit
 from numpy.random import Generator
 
+from berteam_cli.arithmetic import multiply, tanh
+
 Singles = npt.NDArray[np.float32]
 
 # Sums may be reordered to fill vector registers, in one way for each machine; NaN and infinity stay what they are.
@@ -70,56 +72,6 @@ def uniform(sizes: tuple[int, ...], members: int, rng: Generator) -> Singles:
 
 
 @compiled
-def add_product(a: Singles, b: Singles, c: Singles) -> None:
-    """Adds the matrix product ``a`` times ``b`` to ``c``, which is changed.
-
-    Args:
-        a: (m, k), in any layout.
-        b: (k, n), row by row.
-        c: (m, n), row by row.
-    """
-    inner = b.shape[0]
-    for i in range(c.shape[0]):
-        row = c[i]
-        k = 0
-        while k + 8 <= inner:  # eight rows of b for each pass over the row of c, which saves loads and stores of it
-            a0, a1, a2, a3 = a[i, k], a[i, k + 1], a[i, k + 2], a[i, k + 3]
-            a4, a5, a6, a7 = a[i, k + 4], a[i, k + 5], a[i, k + 6], a[i, k + 7]
-            b0, b1, b2, b3 = b[k], b[k + 1], b[k + 2], b[k + 3]
-            b4, b5, b6, b7 = b[k + 4], b[k + 5], b[k + 6], b[k + 7]
-            for j in range(len(row)):
-                low = a0 * b0[j] + a1 * b1[j] + a2 * b2[j] + a3 * b3[j]
-                row[j] += low + (a4 * b4[j] + a5 * b5[j] + a6 * b6[j] + a7 * b7[j])
-            k += 8
-        while k < inner:
-            last, left = b[k], a[i, k]
-            for j in range(len(row)):
-                row[j] += left * last[j]
-            k += 1
-
-
-@compiled
-def tanh(x: Singles) -> None:
-    """Replaces ``x``, shape (n,), by its hyperbolic tangent, to within 2e-7.
-
-    A quotient of polynomials (the coefficients are Eigen's), since a call for each number fills no vector register.
-    """
-    for j in range(len(x)):
-        v = min(max(x[j], np.float32(-7.905311)), np.float32(7.905311))  # beyond it the quotient is 1
-        w = v * v
-        p = np.float32(-2.76076847742355e-16) * w + np.float32(2.00018790482477e-13)
-        p = p * w + np.float32(-8.60467152213735e-11)
-        p = p * w + np.float32(5.12229709037114e-08)
-        p = p * w + np.float32(1.48572235717979e-05)
-        p = p * w + np.float32(6.37261928875436e-04)
-        p = p * w + np.float32(4.89352455891786e-03)
-        q = np.float32(1.19825839466702e-06) * w + np.float32(1.18534705686654e-04)
-        q = q * w + np.float32(2.26843463243900e-03)
-        q = q * w + np.float32(4.89352518554385e-03)
-        x[j] = v * p / q
-
-
-@compiled
 def forward(weights: Singles, sizes: npt.NDArray[np.int64], smooth: bool, x: Singles, values: Singles) -> Singles:
     """Returns the outputs (n, out) of one network, a view of ``values``.
 
@@ -136,17 +88,13 @@ def forward(weights: Singles, sizes: npt.NDArray[np.int64], smooth: bool, x: Sin
         wide, out = sizes[layer - 1], sizes[layer]
         bias = at + wide * out
         above = values[start : start + n * out].reshape((n, out))
-        for i in range(n):
-            for j in range(out):
-                above[i, j] = weights[bias + j]
-        add_product(below, weights[at:bias].reshape((wide, out)), above)
+        multiply(below, weights[at:bias].reshape((wide, out)), weights[bias : bias + out], above)
         if layer + 1 < len(sizes):
-            flat = values[start : start + n * out]
             if smooth:
-                tanh(flat)
+                tanh(values, start, n * out)
             else:
-                for j in range(len(flat)):
-                    flat[j] = max(flat[j], np.float32(0.0))
+                for j in range(start, start + n * out):
+                    values[j] = max(values[j], np.float32(0.0))
         below = above
         at = bias + out
         start += n * out
@@ -175,31 +123,40 @@ def backward(
         gradient: (W,). Changed.
     """
     n, at, start = len(x), len(weights), n_values(sizes, len(x))
-    gradient[:] = 0.0
+    widest = sizes.max()
+    ones, zeros = np.ones((1, n), np.float32), np.zeros(widest, np.float32)
+    transposed, lower = np.empty(widest * widest, np.float32), np.empty((2, n * widest), np.float32)
     for layer in range(len(sizes) - 1, 0, -1):
         wide, out = sizes[layer - 1], sizes[layer]
         start -= n * out
         bias = at - out
         at = bias - wide * out
-        for i in range(n):
-            for j in range(out):
-                gradient[bias + j] += slope[i, j]
+        multiply(ones, slope, zeros, gradient[bias : bias + out].reshape((1, out)))
         matrix = gradient[at:bias].reshape((wide, out))
         if layer == 1:
-            add_product(x.T, slope, matrix)
+            multiply(x.T, slope, zeros, matrix)
             return
         flat = values[start - n * wide : start]
-        add_product(flat.reshape((n, wide)).T, slope, matrix)
-        lower = np.zeros((n, wide), dtype=np.float32)
-        add_product(slope, np.ascontiguousarray(weights[at:bias].reshape((wide, out)).T), lower)
-        flat_slope = lower.reshape(n * wide)
+        multiply(flat.reshape((n, wide)).T, slope, zeros, matrix)
+        turned = transposed[: wide * out].reshape((out, wide))
+        transpose(weights[at:bias].reshape((wide, out)), turned)
+        flat_slope = lower[layer % 2, : n * wide]
+        multiply(slope, turned, zeros, flat_slope.reshape((n, wide)))
         if smooth:
             for j in range(n * wide):
                 flat_slope[j] *= np.float32(1.0) - flat[j] * flat[j]
         else:
             for j in range(n * wide):
                 flat_slope[j] = flat_slope[j] if flat[j] > 0.0 else np.float32(0.0)
-        slope = lower
+        slope = flat_slope.reshape((n, wide))
+
+
+@compiled
+def transpose(matrix: Singles, turned: Singles) -> None:
+    """Writes ``matrix``, shape (m, n), to ``turned``, shape (n, m)."""
+    for j in range(matrix.shape[1]):
+        for i in range(matrix.shape[0]):
+            turned[j, i] = matrix[i, j]
 
 
 @compiled

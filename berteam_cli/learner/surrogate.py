@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from berteam_cli.arithmetic import exp
 from berteam_cli.learner.adam import Adam, Trained, descend
 from berteam_cli.learner.mlp import Singles, backward, compiled, forward, n_values, weight_count
 
@@ -66,9 +67,9 @@ def policy_slope(loss: Surrogate, logits: Singles, sample: Sample, slope: Single
     n, actions = logits.shape
     zero, one, count, entropy_coef = np.float32(0.0), np.float32(1.0), np.float32(n), np.float32(loss.entropy_coef)
     low, high = np.float32(1.0 - loss.clip_range), np.float32(1.0 + loss.clip_range)
+    normalise(logits, slope)
     for i in range(n):
         logs, chances = logits[i], slope[i]
-        normalise(logs, chances)
         entropy = zero
         for j in range(actions):
             entropy -= chances[j] * logs[j]
@@ -104,25 +105,32 @@ def value_slope(loss: Surrogate, values: Singles, sample: Sample, slope: Singles
 
 @compiled
 def normalise(logits: Singles, chances: Singles) -> None:
-    """Writes the softmax of ``logits``, shape (A,), to ``chances`` and replaces them by its logarithms."""
-    top = logits.max()
-    total = np.float32(0.0)
-    for j in range(len(logits)):
-        chances[j] = np.exp(logits[j] - top)
-        total += chances[j]
-    shift = top + np.log(total)
-    for j in range(len(logits)):
-        chances[j] /= total
-        logits[j] -= shift
+    """Writes the softmax of each row of ``logits``, shape (n, A), to ``chances``, and its logarithms to ``logits``."""
+    n, actions = logits.shape
+    for i in range(n):
+        top = logits[i, 0]
+        for j in range(1, actions):
+            top = max(top, logits[i, j])
+        for j in range(actions):
+            logits[i, j] -= top
+            chances[i, j] = logits[i, j]
+    exp(chances.reshape(n * actions), 0, n * actions)
+    for i in range(n):
+        total = np.float32(0.0)
+        for j in range(actions):
+            total += chances[i, j]
+        shift = np.log(total)
+        for j in range(actions):
+            chances[i, j] /= total
+            logits[i, j] -= shift
 
 
 @compiled
 def log_chances(logits: Singles, actions: npt.NDArray[np.int16]) -> Singles:
     """Returns (n,) ln of the probabilities of ``actions``, shape (n,); ``logits``, shape (n, A), are changed."""
+    normalise(logits, np.empty_like(logits))
     result = np.empty(len(logits), np.float32)
-    chances = np.empty(logits.shape[1], np.float32)
     for i in range(len(logits)):
-        normalise(logits[i], chances)
         result[i] = logits[i, actions[i]]
     return result
 

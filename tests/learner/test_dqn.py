@@ -195,7 +195,7 @@ def test_members_act_as_the_network_of_stable_baselines(twin):
     state = grown(dqn, 2)
     policies = dqn.policies(state, explore=False)
     assert policies.kind.tolist() == [GREEDY, GREEDY]
-    work = np.empty((2, policies.sizes.max()), dtype=np.float32)
+    work = np.empty(2 * policies.sizes.max(), dtype=np.float32)
     observations = np.random.default_rng(0).standard_normal((200, 9), dtype=np.float32)
     for k in range(2):
         model = twin(dqn, state.trained.weights[k], state.target[k])
@@ -271,5 +271,5 @@ def test_learns_which_action_is_rewarded():
     for epoch in range(3):
         dqn.learn(state, games, 0, np.random.default_rng(epoch), Workers(1))
     policies = dqn.policies(state, explore=False)
-    work = np.empty((2, policies.sizes.max()), dtype=np.float32)
+    work = np.empty(2 * policies.sizes.max(), dtype=np.float32)
     assert [act(policies, k, observations[0, 0, 0], work, 0.0, 0.5) for k in range(2)] == [3, 1]

@@ -228,7 +228,7 @@ def test_members_act_as_the_policy_of_stable_baselines(twin):
     state = grown(ppo, 2)
     policies = ppo.policies(state, explore=False)
     assert policies.kind.tolist() == [SAMPLED, SAMPLED]
-    work = np.empty((2, policies.sizes.max()), dtype=np.float32)
+    work = np.empty(2 * policies.sizes.max(), dtype=np.float32)
     observation = np.random.default_rng(0).standard_normal(9, dtype=np.float32)
     for k in range(2):
         model = twin(ppo, state.trained.weights[k])
@@ -285,7 +285,7 @@ def test_learns_which_action_is_rewarded():
     for epoch in range(8):
         observations = np.ones((1, 2, 129, 9), dtype=np.float32)
         logits = ppo.policies(state, explore=True)
-        work = np.empty((2, logits.sizes.max()), dtype=np.float32)
+        work = np.empty(2 * logits.sizes.max(), dtype=np.float32)
         choices = rng.random((2, 128))
         draw = [[act(logits, k, observations[0, 0, 0], work, 0.0, c) for c in choices[k]] for k in range(2)]
         actions = np.array([draw], dtype=np.int16)
