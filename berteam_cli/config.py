@@ -202,6 +202,8 @@ class MapElitesConfig(CoevolutionConfig):
     radius: float = number(open_low=True)
     opponents: list[str] = MISSING
     probe_games: int = number(1)
+    project_every: int = number(1)
+    lambda_growth: float = number(1, 100)
 
 
 @dataclass
@@ -223,6 +225,7 @@ class PpoConfig(LearnerConfig):
     """Settings of learner/ppo.py."""
 
     network: list[int] = MISSING
+    activation: str = choice("tanh", "relu")
     learning_rate: float = number(open_low=True)
     n_steps: int = number(2)
     minibatch_size: int = number(2)
@@ -230,6 +233,8 @@ class PpoConfig(LearnerConfig):
     gamma: float = number(0, 1)
     gae_lambda: float = number(0, 1)
     clip_range: float = number(open_low=True)
+    clip_range_vf: float | None = number(open_low=True)
+    target_kl: float | None = number(open_low=True)
     entropy_coef: float = number()
     value_coef: float = number()
     max_grad_norm: float = number(open_low=True)
@@ -241,14 +246,17 @@ class DqnConfig(LearnerConfig):
     """Settings of learner/dqn.py."""
 
     network: list[int] = MISSING
+    activation: str = choice("tanh", "relu")
     learning_rate: float = number(open_low=True)
     buffer_size: int = number(1)
     batch_size: int = number(1)
     gamma: float = number(0, 1)
+    n_steps: int = number(1, 10_000)
     train_freq: int = number(1)
-    gradient_steps: int = number(1)
+    gradient_steps: int = number(-1)
     learning_starts: int = number()
     target_update_interval: int = number(1)
+    tau: float = number(0, 1, open_low=True)
     exploration_initial: float = number(0, 1)
     exploration_final: float = number(0, 1)
     exploration_steps: int = number(1)

@@ -47,7 +47,8 @@ class Population:
         captain_games: (N,) of them as captain.
         parent: (N,) whose copy the member is, NOBODY for those of the beginning.
         behaviour: (N,) aggression as last measured, NaN before.
-        stale: (N,) whether the member played since its behaviour was measured.
+        stale: (N,) whether the member's policy changed since its behaviour was measured.
+        failed: (N,) epochs in a row in which all its updates were undone, since they gave something not finite.
     """
 
     minds: tuple[Any, ...]
@@ -58,6 +59,7 @@ class Population:
     parent: Ints
     behaviour: Floats
     stale: Bools
+    failed: Ints
 
     @property
     def size(self) -> int:
@@ -65,7 +67,7 @@ class Population:
         return len(self.fitness)
 
 
-ARRAYS = ("fitness", "age", "games", "captain_games", "parent", "behaviour", "stale")
+ARRAYS = ("fitness", "age", "games", "captain_games", "parent", "behaviour", "stale", "failed")
 
 
 def founded(islands: tuple[Island, ...], fitness: float, rng: Generator) -> Population:
@@ -81,6 +83,7 @@ def founded(islands: tuple[Island, ...], fitness: float, rng: Generator) -> Popu
         parent=np.full(members, NOBODY, dtype=np.int64),
         behaviour=np.full(members, np.nan),
         stale=np.ones(members, dtype=np.bool_),
+        failed=np.zeros(members, dtype=np.int64),
     )
 
 
@@ -108,7 +111,6 @@ def policies(islands: tuple[Island, ...], population: Population, *, explore: bo
 def counted(population: Population, outcomes: Outcomes) -> Population:
     """Returns the population with the games of ``outcomes`` added to its counters."""
     size = population.size
-    places = np.bincount(outcomes.lineups.teams.ravel(), minlength=size)
     # A member that holds two places of one team plays one game for that side.
     sides = np.sort(outcomes.lineups.teams.reshape(-1, outcomes.lineups.teams.shape[-1]), axis=1)
     first = np.ones(sides.shape, dtype=np.bool_)
@@ -118,5 +120,4 @@ def counted(population: Population, outcomes: Outcomes) -> Population:
         population,
         games=population.games + np.bincount(sides[first], minlength=size),
         captain_games=population.captain_games + np.bincount(captains[captains != NOBODY], minlength=size),
-        stale=population.stale | (places > 0),
     )

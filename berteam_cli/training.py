@@ -86,10 +86,10 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     outcomes, experience = parts.games.play(acting, lineups, key(play), record=optimizer.learns)
     population = optimizer.rate(population, outcomes)
     clock.lap("play_s")
-    population, learnt = optimizer.train(population, experience, learn)
+    population, learnt, healed = optimizer.train(population, experience, learn)
     clock.lap("learn_s")
     probes = Probes(parts, key(probe))
-    population = optimizer.project(population, probes.play)
+    population = optimizer.project(population, run.epoch + 1, probes.play)
     clock.lap("probe_s")
     population, replaced = optimizer.renew(population, renew)
     clock.lap("renew_s")
@@ -98,7 +98,7 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
 
     steps = int(outcomes.steps.sum()) + probes.steps
     after = Run(run.epoch + 1, population, selection, run.played + len(lineups), run.steps + steps)
-    return after, Report(outcomes, learnt, replaced, selecting, steps, clock.laps)
+    return after, Report(outcomes, learnt, healed + replaced, selecting, steps, clock.laps)
 
 
 def key(rng: Generator) -> int:

@@ -26,6 +26,7 @@ class Learning:
         q_value: mean of Q of the actions taken; DQN's figure.
         epsilon: chance of a random action after the epoch; DQN's figure.
         steps: transitions that arrived in this epoch.
+        failures: updates of this epoch that were undone, since they gave weights or a loss that are not finite.
     """
 
     row: int
@@ -39,6 +40,7 @@ class Learning:
     q_value: float = float("nan")
     epsilon: float = float("nan")
     steps: int = 0
+    failures: int = 0
 
 
 LEARNING_FIGURES = tuple(field.name for field in fields(Learning))[1:]

@@ -12,10 +12,11 @@ from numpy.random import Generator
 from berteam_cli.acting import GREEDY, Policies, networks
 from berteam_cli.learner.adam import Adam, Trained, untrained
 from berteam_cli.learner.base import Learning
+from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, layers, uniform
 from berteam_cli.learner.replay import Replay, empty, remember
-from berteam_cli.learner.temporal import learn_steps, schedule
-from berteam_cli.outcomes import Experience, Floats, Ints
+from berteam_cli.learner.temporal import Difference, learn_steps, schedule
+from berteam_cli.outcomes import Bools, Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
 ADAM_EPSILON = 1e-8  # torch's, which Stable-Baselines3 leaves for DQN
@@ -45,14 +46,17 @@ class Dqn:
         observation_size: O.
         actions: A.
         network: widths of the hidden layers.
+        activation: of the hidden layers, "tanh" or "relu".
         learning_rate: Adam's.
         buffer_size: steps a member remembers.
         batch_size: steps of one gradient step.
         gamma: discount of one step.
+        n_steps: rewards of so many steps are added up before the target network is asked.
         train_freq: steps of the game from one learning to the next.
-        gradient_steps: gradient steps of each learning.
+        gradient_steps: gradient steps of each learning; -1: as many as steps of the game.
         learning_starts: steps a member makes before it learns.
         target_update_interval: steps of the game until the target network is renewed.
+        tau: share of its way to the network's weights that the target goes then.
         exploration_initial: chance of a random action before the first step.
         exploration_final: chance of a random action at the end of the schedule, and later.
         exploration_steps: steps over which it falls in a straight line.
@@ -62,14 +66,17 @@ class Dqn:
     observation_size: int
     actions: int
     network: tuple[int, ...]
+    activation: str
     learning_rate: float
     buffer_size: int
     batch_size: int
     gamma: float
+    n_steps: int
     train_freq: int
     gradient_steps: int
     learning_starts: int
     target_update_interval: int
+    tau: float
     exploration_initial: float
     exploration_final: float
     exploration_steps: int
@@ -81,6 +88,11 @@ class Dqn:
     def sizes(self) -> tuple[int, ...]:
         """Widths of the network's layers."""
         return (self.observation_size, *self.network, self.actions)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether hidden layers use tanh, else ReLU."""
+        return self.activation == "tanh"
 
     def init(self, members: int, rng: Generator) -> DqnState:
         """Returns the state of ``members`` members that have not learnt yet."""
@@ -96,7 +108,7 @@ class Dqn:
     def policies(self, state: DqnState, *, explore: bool) -> Policies:
         """Returns the members' greedy policies, which err at random as their schedules say if they ``explore``."""
         chance = self.epsilon(state.collected) if explore else 0.0
-        return networks(GREEDY, layers(state.trained.weights, self.sizes), tanh=False, epsilon=chance)
+        return networks(GREEDY, layers(state.trained.weights, self.sizes), tanh=self.smooth, epsilon=chance)
 
     def names(self, state: DqnState, island: str) -> list[str]:
         """Returns the island's name with the member's number in it."""
@@ -125,22 +137,35 @@ class Dqn:
     def member_learns(self, state: DqnState, row: int, before: int, rng: Generator) -> Learning:
         """Takes the gradient steps for the steps a member has made since it had made ``before``."""
         after = int(state.collected[row])
+        each = self.train_freq if self.gradient_steps == -1 else self.gradient_steps
         count, renewals = schedule(
-            before, after, self.train_freq, self.gradient_steps, self.learning_starts, self.target_update_interval
+            before, after, self.train_freq, each, self.learning_starts, self.target_update_interval
         )
-        loss, q_value = learn_steps(
+        figures = guarded(
+            (*state.trained, state.target),
+            row,
+            lambda: self.steps_taken(state, row, count, renewals, rng),
+        )
+        epsilon = float(self.epsilon(state.collected[row]))
+        if figures is None:
+            return Learning(row, epsilon=epsilon, steps=after - before, failures=1)
+        means = dict(zip(("loss", "q_value"), figures.tolist(), strict=True)) if count else {}
+        return Learning(row, updates=count, epsilon=epsilon, steps=after - before, **means)
+
+    def steps_taken(self, state: DqnState, row: int, count: int, renewals: Bools, rng: Generator) -> Floats:
+        """Takes ``count`` gradient steps of one member; returns the means of loss and of Q."""
+        collected = int(state.collected[row])
+        return learn_steps(
+            Difference(self.gamma, self.n_steps, self.tau, self.smooth),
             Adam(self.learning_rate, ADAM_EPSILON, self.max_grad_norm),
             state.trained.member(row),
             state.target[row],
             np.array(self.sizes),
             state.replay.member(row),
-            rng.integers(0, min(after, self.buffer_size), (count, self.batch_size)),
+            (collected - 1) % self.buffer_size,
+            rng.integers(0, min(collected, self.buffer_size), (count, self.batch_size)),
             renewals,
-            self.gamma,
         )
-        figures = {"loss": float(loss), "q_value": float(q_value)} if count else {}
-        epsilon = float(self.epsilon(state.collected[row]))
-        return Learning(row, updates=count, epsilon=epsilon, steps=after - before, **figures)
 
     def copy(self, state: DqnState, child: int, parent: int) -> None:
         """Makes ``child`` a copy of ``parent``, with all that it remembers."""

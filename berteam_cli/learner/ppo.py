@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -12,10 +13,11 @@ from numpy.random import Generator
 from berteam_cli.acting import SAMPLED, Policies, networks
 from berteam_cli.learner.adam import Adam, Trained, untrained
 from berteam_cli.learner.base import Learning
+from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, forward, layers, n_values, orthogonal, weight_count
 from berteam_cli.learner.rollout import Steps, advantages, append, empty, seen, stitched
 from berteam_cli.learner.surrogate import FIGURES, Sample, Surrogate, log_chances, one_update
-from berteam_cli.outcomes import Experience, Ints
+from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
 ADAM_EPSILON = 1e-5  # Stable-Baselines3's for actor-critic policies; torch's own is 1e-8
@@ -43,6 +45,7 @@ class Ppo:
         observation_size: O.
         actions: A.
         network: widths of the hidden layers of the policy and, apart from it, of the value network.
+        activation: of the hidden layers, "tanh" or "relu".
         learning_rate: Adam's.
         n_steps: steps a member gathers, over games and epochs, before it learns from them.
         minibatch_size: steps of one gradient step.
@@ -50,6 +53,8 @@ class Ppo:
         gamma: discount of one step.
         gae_lambda: in [0, 1], how far advantages look ahead.
         clip_range: how far an action's probability may move, as a share of what it was.
+        clip_range_vf: how far a value may move from what it was; None: anywhere.
+        target_kl: an update ends when the policy has diverged by 1.5 times this from the one that acted; None: never.
         entropy_coef: weight of the entropy in the loss.
         value_coef: weight of the value network's squared error in the loss.
         max_grad_norm: a member's gradient is shortened to this norm.
@@ -59,6 +64,7 @@ class Ppo:
     observation_size: int
     actions: int
     network: tuple[int, ...]
+    activation: str
     learning_rate: float
     n_steps: int
     minibatch_size: int
@@ -66,6 +72,8 @@ class Ppo:
     gamma: float
     gae_lambda: float
     clip_range: float
+    clip_range_vf: float | None
+    target_kl: float | None
     entropy_coef: float
     value_coef: float
     max_grad_norm: float
@@ -83,6 +91,22 @@ class Ppo:
         """Widths of the value network's layers."""
         return (self.observation_size, *self.network, 1)
 
+    @property
+    def smooth(self) -> bool:
+        """Whether hidden layers use tanh, else ReLU."""
+        return self.activation == "tanh"
+
+    @property
+    def surrogate(self) -> Surrogate:
+        """The settings of the loss."""
+        reach, limit = (math.inf if x is None else x for x in (self.clip_range_vf, self.target_kl))
+        return Surrogate(self.clip_range, reach, limit, self.entropy_coef, self.value_coef, self.normalize_advantage)
+
+    @property
+    def adam(self) -> Adam:
+        """The settings of the optimizer."""
+        return Adam(self.learning_rate, ADAM_EPSILON, self.max_grad_norm)
+
     def init(self, members: int, rng: Generator) -> PpoState:
         """Returns the state of ``members`` members that have not learnt yet."""
         policy = orthogonal(self.policy_sizes, 0.01, members, rng)  # nearly uniform over the actions
@@ -95,7 +119,7 @@ class Ppo:
 
     def policies(self, state: PpoState, *, explore: bool) -> Policies:
         """Returns the members' stochastic policies; they are evaluated as they play, whatever ``explore`` is."""
-        return networks(SAMPLED, layers(state.trained.weights, self.policy_sizes), tanh=True)
+        return networks(SAMPLED, layers(state.trained.weights, self.policy_sizes), tanh=self.smooth)
 
     def names(self, state: PpoState, island: str) -> list[str]:
         """Returns the island's name with the member's number in it."""
@@ -121,40 +145,50 @@ class Ppo:
         """Returns one member's new steps, with what its networks say of them before it learns."""
         what = seen(experience, trajectories)
         weights, count = state.trained.weights[row], weight_count(np.array(self.policy_sizes))
-        logits = outputs(weights[:count], self.policy_sizes, what.observations)
-        values = outputs(weights[count:], self.value_sizes, what.observations)
+        logits = outputs(weights[:count], self.policy_sizes, self.smooth, what.observations)
+        values = outputs(weights[count:], self.value_sizes, self.smooth, what.observations)
         return stitched(what, values[:, 0], log_chances(logits, what.actions), self.gamma)
 
     def member_learns(self, state: PpoState, row: int, new: Steps, rng: Generator) -> Learning:
         """Adds ``new`` steps to a member's rollout and updates it as often as that is full."""
-        figures: list[Singles] = []
+        figures: list[Floats] = []
+        failures, taken = 0, int(state.trained.updates[row])
         used = append(state.rollouts, state.filled, row, new, 0)
         while state.filled[row] == self.n_steps:
-            figures.append(self.update(state, row, rng))
+            of_update = guarded(state.trained, row, lambda: self.update(state, row, rng))
+            figures += [] if of_update is None else [of_update]
+            failures += of_update is None
             state.filled[row] = 0
             used += append(state.rollouts, state.filled, row, new, used)
-        if not figures:
-            return Learning(row, steps=used)
-        means = dict(zip(FIGURES, np.mean(figures, axis=0).tolist(), strict=True))
-        minibatches = -(-self.n_steps // self.minibatch_size)
-        return Learning(row, updates=len(figures) * self.n_epochs * minibatches, steps=used, **means)
+        means = dict(zip(FIGURES, np.mean(figures, axis=0).tolist(), strict=True)) if figures else {}
+        return Learning(row, int(state.trained.updates[row]) - taken, **means, steps=used, failures=failures)
 
-    def update(self, state: PpoState, row: int, rng: Generator) -> Singles:
+    def update(self, state: PpoState, row: int, rng: Generator) -> Floats:
         """Lets a member learn from its full rollout; returns (len(FIGURES),) figures."""
+        return one_update(
+            self.surrogate,
+            self.adam,
+            state.trained.member(row),
+            np.array(self.policy_sizes),
+            np.array(self.value_sizes),
+            self.smooth,
+            self.sample(state, row),
+            self.orders(rng),
+            self.minibatch_size,
+        )
+
+    def sample(self, state: PpoState, row: int) -> Sample:
+        """Returns a member's full rollout with its advantages and returns, as a loss wants it."""
         rollout = Steps(*(column[row] for column in state.rollouts))
         gains = advantages(
             rollout.rewards, rollout.values, rollout.next_values, rollout.ends, self.gamma, self.gae_lambda
         )
-        return one_update(
-            Surrogate(self.clip_range, self.entropy_coef, self.value_coef, self.normalize_advantage),
-            Adam(self.learning_rate, ADAM_EPSILON, self.max_grad_norm),
-            state.trained.member(row),
-            np.array(self.policy_sizes),
-            np.array(self.value_sizes),
-            Sample(rollout.observations, rollout.actions, rollout.log_probs, gains, gains + rollout.values),
-            np.stack([rng.permutation(self.n_steps) for _ in range(self.n_epochs)]),
-            self.minibatch_size,
-        )
+        returns = gains + rollout.values
+        return Sample(rollout.observations, rollout.actions, rollout.log_probs, gains, rollout.values, returns)
+
+    def orders(self, rng: Generator) -> Ints:
+        """Returns (n_epochs, n_steps) in which order each pass takes the steps."""
+        return np.stack([rng.permutation(self.n_steps) for _ in range(self.n_epochs)])
 
     def copy(self, state: PpoState, child: int, parent: int) -> None:
         """Makes ``child`` a copy of ``parent`` with an empty rollout, since the parent's steps are not its own."""
@@ -165,7 +199,11 @@ class Ppo:
 
     def tensors(self, state: PpoState) -> dict[str, Any]:
         """Returns all that ``state`` holds, by name."""
-        columns = {**state.trained._asdict(), **state.rollouts._asdict(), "filled": state.filled}
+        columns = {
+            **state.trained._asdict(),
+            **state.rollouts._asdict(),
+            "filled": state.filled,
+        }
         return {name: torch.from_numpy(column) for name, column in columns.items()}
 
     def restored(self, tensors: dict[str, Any]) -> PpoState:
@@ -178,8 +216,8 @@ class Ppo:
         )
 
 
-def outputs(weights: Singles, sizes: tuple[int, ...], observations: Singles) -> Singles:
-    """Returns the outputs (n, out) of one tanh network for ``observations``, shape (n, O)."""
+def outputs(weights: Singles, sizes: tuple[int, ...], smooth: bool, observations: Singles) -> Singles:
+    """Returns the outputs (n, out) of one network for ``observations``, shape (n, O)."""
     widths = np.array(sizes)
     values = np.empty(n_values(widths, len(observations)), dtype=np.float32)
-    return forward(weights, widths, True, observations, values)
+    return forward(weights, widths, smooth, observations, values)

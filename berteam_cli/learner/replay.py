@@ -22,6 +22,7 @@ class Replay(NamedTuple):
         actions: (M, R) int16.
         rewards: (M, R) float32.
         terminated: (M, R) bool, whether the rules ended the game with the step; when time runs out they do not.
+        ends: (M, R) bool, whether the game ended with the step, by its rules or by the clock.
     """
 
     observations: Singles
@@ -29,6 +30,7 @@ class Replay(NamedTuple):
     actions: npt.NDArray[np.int16]
     rewards: Singles
     terminated: Bools
+    ends: Bools
 
     def member(self, row: int) -> Replay:
         """Returns views of one member's ring."""
@@ -44,6 +46,7 @@ def empty(members: int, length: int, observation_size: int) -> Replay:
         actions=np.zeros(shape, dtype=np.int16),
         rewards=np.zeros(shape, dtype=np.float32),
         terminated=np.zeros(shape, dtype=np.bool_),
+        ends=np.zeros(shape, dtype=np.bool_),
     )
 
 
@@ -67,5 +70,6 @@ def remember(ring: Replay, collected: int, experience: Experience, game: int, pl
     ring.next_observations[at] = experience.observations[game, player, steps + 1]
     ring.actions[at] = experience.actions[game, player, steps]
     ring.rewards[at] = experience.rewards[game, player, steps]
-    ring.terminated[at] = experience.terminated[game] & (steps == length - 1)
+    ring.ends[at] = steps == length - 1
+    ring.terminated[at] = ring.ends[at] & experience.terminated[game]
     return collected + length

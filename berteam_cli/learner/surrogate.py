@@ -11,8 +11,10 @@ import numpy.typing as npt
 from berteam_cli.arithmetic import exp
 from berteam_cli.learner.adam import Adam, Trained, descend
 from berteam_cli.learner.mlp import Singles, backward, compiled, forward, n_values, weight_count
+from berteam_cli.outcomes import Floats
 
 FIGURES = ("loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction")
+KL = FIGURES.index("approx_kl")
 
 
 class Surrogate(NamedTuple):
@@ -20,16 +22,22 @@ class Surrogate(NamedTuple):
 
     With r an action's probability over the one it had when it was chosen, A its advantage, H the entropy, V the
     value and R the return, the loss of a minibatch is
-    -mean(min(r A, clip(r, 1 - c, 1 + c) A)) - entropy_coef mean(H) + value_coef mean((V - R)²).
+    -mean(min(r A, clip(r, 1 - c, 1 + c) A)) - entropy_coef mean(H) + value_coef mean((V - R)²). With a clip_range_vf,
+    V is what it was when the step was made plus its change since then, clipped to ± clip_range_vf.
 
     Attributes:
         clip_range: c > 0.
+        clip_range_vf: how far a value may move, infinity for no limit.
+        target_kl: the update ends before the gradient step in which the policy's divergence from the one that acted is
+            above 1.5 times this; infinity for never.
         entropy_coef: weight of the entropy.
         value_coef: weight of the squared error.
         normalize_advantage: whether A gets mean 0 and standard deviation 1 in each minibatch.
     """
 
     clip_range: float
+    clip_range_vf: float
+    target_kl: float
     entropy_coef: float
     value_coef: float
     normalize_advantage: bool
@@ -43,13 +51,15 @@ class Sample(NamedTuple):
         actions: (n,) int16, what was done.
         log_probs: (n,) float32, ln of the probability it had then.
         advantages: (n,) float32.
-        returns: (n,) float32, advantages plus the values of then.
+        values: (n,) float32, of the observations then.
+        returns: (n,) float32, advantages plus those values.
     """
 
     observations: Singles
     actions: npt.NDArray[np.int16]
     log_probs: Singles
     advantages: Singles
+    values: Singles
     returns: Singles
 
 
@@ -88,7 +98,7 @@ def policy_slope(loss: Surrogate, logits: Singles, sample: Sample, slope: Single
         figures[0] -= gain + entropy_coef * entropy
         figures[1] -= gain
         figures[3] += entropy
-        figures[4] += ratio - one - log_ratio
+        figures[KL] += ratio - one - log_ratio
         figures[5] += abs(ratio - one) > loss.clip_range
 
 
@@ -96,9 +106,12 @@ def policy_slope(loss: Surrogate, logits: Singles, sample: Sample, slope: Single
 def value_slope(loss: Surrogate, values: Singles, sample: Sample, slope: Singles, figures: Singles) -> None:
     """Writes the derivative of the loss with respect to the values (n, 1), and adds the figures to their sums."""
     n = len(values)
+    reach = np.float32(loss.clip_range_vf)
     for i in range(n):
-        error = values[i, 0] - sample.returns[i]
-        slope[i, 0] = 2.0 * loss.value_coef * error / n
+        moved = values[i, 0] - sample.values[i]
+        bounded = min(max(moved, -reach), reach)
+        error = sample.values[i] + bounded - sample.returns[i] if bounded != moved else values[i, 0] - sample.returns[i]
+        slope[i, 0] = 2.0 * loss.value_coef * error / n if bounded == moved else np.float32(0.0)
         figures[0] += loss.value_coef * error * error
         figures[2] += error * error
 
@@ -158,13 +171,14 @@ def one_update(
     member: Trained,
     policy_sizes: npt.NDArray[np.int64],
     value_sizes: npt.NDArray[np.int64],
+    smooth: bool,
     rollout: Sample,
     orders: npt.NDArray[np.int64],
     minibatch_size: int,
-) -> Singles:
-    """Lets one member learn from a full rollout; returns (len(FIGURES),) means over the gradient steps.
+) -> Floats:
+    """Lets one member learn from a full rollout; returns (len(FIGURES),) means over the minibatches.
 
-    The mean of the divergence is over the last pass only, as in Stable-Baselines3.
+    The mean of the divergence is over those of the last pass only, as in Stable-Baselines3.
 
     Args:
         loss: settings of the loss.
@@ -172,6 +186,7 @@ def one_update(
         member: as ``Trained.member`` returns it, the policy network's weights before the value network's. Changed.
         policy_sizes: widths of the policy network's layers.
         value_sizes: widths of the value network's layers.
+        smooth: whether hidden layers use tanh, else ReLU.
         rollout: n steps.
         orders: for each pass a permutation of them. Its last minibatch may be smaller.
         minibatch_size: steps of one gradient step.
@@ -182,30 +197,49 @@ def one_update(
     gradient = np.empty_like(member.weights)
     values = np.empty(n_values(policy_sizes, minibatch_size) + n_values(value_sizes, minibatch_size), np.float32)
     figures, sums = np.zeros(len(FIGURES)), np.empty(len(FIGURES))
-    minibatches = (n + minibatch_size - 1) // minibatch_size
-    for k in range(passes):
-        figures[4] = 0.0
-        for start in range(0, n, minibatch_size):
-            at = orders[k, start : start + minibatch_size]
-            sample = Sample(
-                rollout.observations[at],
-                rollout.actions[at],
-                rollout.log_probs[at],
-                rollout.advantages[at],
-                rollout.returns[at],
-            )
+    seen, seen_in_pass, near = 0, 0, True
+    k = 0
+    while k < passes and near:
+        figures[KL], seen_in_pass = 0.0, 0
+        start = 0
+        while start < n and near:
+            sample = drawn(rollout, orders[k, start : start + minibatch_size])
+            x, count = sample.observations, len(sample.actions)
+            cut = n_values(policy_sizes, count)
+            of_policy, of_value = values[:cut], values[cut:]
             sums[:] = 0.0
             if loss.normalize_advantage:
                 standardise(sample.advantages)
-            logits = forward(policy, policy_sizes, True, sample.observations, values)
-            slope = np.empty_like(logits)
-            policy_slope(loss, logits, sample, slope, sums)
-            backward(policy, policy_sizes, True, sample.observations, values, slope, gradient[:policy_count])
-            outputs = forward(value, value_sizes, True, sample.observations, values)
-            slope = np.empty_like(outputs)
-            value_slope(loss, outputs, sample, slope, sums)
-            backward(value, value_sizes, True, sample.observations, values, slope, gradient[policy_count:])
-            descend(adam, member, gradient)
-            figures += sums / len(at)
-    figures[4] *= passes  # of the last pass alone
-    return figures / (passes * minibatches)
+            logits = forward(policy, policy_sizes, smooth, x, of_policy)
+            policy_slopes = np.empty_like(logits)
+            policy_slope(loss, logits, sample, policy_slopes, sums)
+            outputs = forward(value, value_sizes, smooth, x, of_value)
+            value_slopes = np.empty_like(outputs)
+            value_slope(loss, outputs, sample, value_slopes, sums)
+            figures += sums / count
+            seen += 1
+            seen_in_pass += 1
+            near = not sums[KL] / count > 1.5 * loss.target_kl
+            if near:
+                backward(policy, policy_sizes, smooth, x, of_policy, policy_slopes, gradient[:policy_count])
+                backward(value, value_sizes, smooth, x, of_value, value_slopes, gradient[policy_count:])
+                descend(adam, member, gradient)
+            start += minibatch_size
+        k += 1
+    divergence = figures[KL] / seen_in_pass
+    figures /= seen
+    figures[KL] = divergence
+    return figures
+
+
+@compiled
+def drawn(rollout: Sample, at: npt.NDArray[np.int64]) -> Sample:
+    """Returns copies of the steps ``at`` of a rollout."""
+    return Sample(
+        rollout.observations[at],
+        rollout.actions[at],
+        rollout.log_probs[at],
+        rollout.advantages[at],
+        rollout.values[at],
+        rollout.returns[at],
+    )

@@ -1,6 +1,8 @@
-"""The gradient steps of DQN: one-step temporal differences against a target network."""
+"""The gradient steps of DQN: temporal differences of one or more steps against a target network."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,46 +39,64 @@ def schedule(
     return len(learnings), np.diff(times // target_update_interval) > 0
 
 
+class Difference(NamedTuple):
+    """Settings of the temporal difference.
+
+    Attributes:
+        gamma: discount of one step.
+        n_steps: rewards of so many steps are added up before the target network is asked.
+        tau: share of its way to the network's weights that the target goes when it is renewed; 1 all of it.
+        smooth: whether hidden layers use tanh, else ReLU.
+    """
+
+    gamma: float
+    n_steps: int
+    tau: float
+    smooth: bool
+
+
 @compiled
 def learn_steps(
+    difference: Difference,
     adam: Adam,
     member: Trained,
     target: Singles,
     sizes: Ints,
     ring: Replay,
+    newest: int,
     batches: Ints,
     renewals: Bools,
-    gamma: float,
 ) -> Floats:
     """Takes gradient steps on the smooth absolute error of Q; returns the means of loss and of Q.
 
     Args:
+        difference: settings of the error.
         adam: settings of the optimizer.
         member: as ``Trained.member`` returns it. Changed.
         target: (W,) weights of the target network. Changed where renewed.
         sizes: widths of the network's layers.
         ring: the member's.
+        newest: where in the ring the member's last step is.
         batches: (k, n) places in the ring, for each gradient step.
         renewals: (k + 1,) whether the target is renewed before each gradient step, and at the end.
-        gamma: discount of one step.
     """
     steps, n = batches.shape
     gradient = np.empty_like(member.weights)
     values = np.empty(n_values(sizes, n), np.float32)
     slope = np.empty((n, sizes[-1]), np.float32)
-    goals = np.empty(n, np.float32)
+    goals, discounts, last = np.empty(n, np.float32), np.empty(n, np.float32), np.empty(n, np.int64)
     figures = np.zeros(2)
     for k in range(steps):
         if renewals[k]:
-            target[:] = member.weights
+            follow(target, member.weights, difference.tau)
         at = batches[k]
-        future = forward(target, sizes, False, ring.next_observations[at], values)
+        add_rewards(difference, ring, newest, at, goals, discounts, last)
+        future = forward(target, sizes, difference.smooth, ring.next_observations[last], values)
         for i in range(n):
-            goals[i] = ring.rewards[at[i]]
-            if not ring.terminated[at[i]]:
-                goals[i] += np.float32(gamma) * future[i].max()
+            if not ring.terminated[last[i]]:
+                goals[i] += discounts[i] * future[i].max()
         observations = ring.observations[at]
-        q = forward(member.weights, sizes, False, observations, values)
+        q = forward(member.weights, sizes, difference.smooth, observations, values)
         slope[:] = 0.0
         for i in range(n):
             action = ring.actions[at[i]]
@@ -85,8 +105,42 @@ def learn_steps(
             slope[i, action] = min(max(error, np.float32(-1.0)), np.float32(1.0)) / n
             figures[0] += (0.5 * error * error if far < 1.0 else far - 0.5) / n
             figures[1] += q[i, action] / n
-        backward(member.weights, sizes, False, observations, values, slope, gradient)
+        backward(member.weights, sizes, difference.smooth, observations, values, slope, gradient)
         descend(adam, member, gradient)
     if renewals[steps]:
-        target[:] = member.weights
+        follow(target, member.weights, difference.tau)
     return figures / max(steps, 1)
+
+
+@compiled
+def follow(target: Singles, weights: Singles, tau: float) -> None:
+    """Moves ``target``, shape (W,), a share ``tau`` of its way to ``weights``."""
+    for j in range(len(target)):
+        target[j] = target[j] * np.float32(1.0 - tau) + weights[j] * np.float32(tau)
+
+
+@compiled
+def add_rewards(
+    difference: Difference, ring: Replay, newest: int, at: Ints, goals: Singles, discounts: Singles, last: Ints
+) -> None:
+    """Adds up discounted rewards from the steps ``at``, shape (n,), on, until the game or what is known of it ends.
+
+    Args:
+        difference: its ``n_steps`` is how many at most.
+        ring: the member's.
+        newest: where in the ring the member's last step is.
+        at: where the first steps are.
+        goals: (n,). Changed to the sums.
+        discounts: (n,). Changed to the discounts of what comes after.
+        last: (n,). Changed to where the last steps are.
+    """
+    for i in range(len(at)):
+        discounts[i], last[i] = 1.0, at[i]
+        goals[i] = ring.rewards[at[i]]
+        for _ in range(1, difference.n_steps):
+            if ring.ends[last[i]] or last[i] == newest:
+                break
+            discounts[i] *= np.float32(difference.gamma)
+            last[i] = (last[i] + 1) % len(ring.rewards)
+            goals[i] += discounts[i] * ring.rewards[last[i]]
+        discounts[i] *= np.float32(difference.gamma)

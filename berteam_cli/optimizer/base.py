@@ -54,11 +54,14 @@ class Optimizer(Protocol):
 
     def train(
         self, population: Population, experience: Experience, rng: Generator
-    ) -> tuple[Population, list[tuple[int, Learning]]]:
-        """Returns the population after each member learnt from its own steps, and what (island, figures)."""
+    ) -> tuple[Population, list[tuple[int, Learning]], list[Replacement]]:
+        """Returns the population after each member learnt from its own steps.
 
-    def project(self, population: Population, probe: Probe) -> Population:
-        """Returns the population with its behaviour measured where this optimizer needs it."""
+        Also returns what was learnt, (island, figures), and who was replaced for being unable to learn any more.
+        """
+
+    def project(self, population: Population, number: int, probe: Probe) -> Population:
+        """Returns the population with its behaviour measured where this optimizer needs it in epoch ``number``."""
 
     def renew(self, population: Population, rng: Generator) -> tuple[Population, list[Replacement]]:
         """Returns the population one epoch older, after some members were replaced by copies of others."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,8 +12,12 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.optimizer.base import Replacement
 from berteam_cli.optimizer.fixed import Fixed
 from berteam_cli.outcomes import Experience, Floats, Ints
-from berteam_cli.population import Island, Population
+from berteam_cli.population import ARRAYS, Island, Population
 from berteam_cli.workers import Workers
+
+log = logging.getLogger("berteam")
+
+HOPELESS = 2  # epochs in a row in which nothing but undone updates came
 
 
 @dataclass(frozen=True)
@@ -39,14 +44,45 @@ class Coevolution(Fixed):
 
     def train(
         self, population: Population, experience: Experience, rng: Generator
-    ) -> tuple[Population, list[tuple[int, Learning]]]:
-        """Returns the population after each member learnt from its own steps, and what (island, figures)."""
+    ) -> tuple[Population, list[tuple[int, Learning]], list[Replacement]]:
+        """Returns the population after each member learnt from its own steps.
+
+        Also returns what was learnt, (island, figures), and who was replaced for being unable to learn any more.
+        """
         learnt = []
         for i, (island, mind, stream) in enumerate(
             zip(self.islands, population.minds, rng.spawn(len(self.islands)), strict=True)
         ):
             learnt += [(i, x) for x in island.learner.learn(mind, experience, island.first, stream, self.workers)]
-        return population, learnt
+        population = own(population)
+        for i, x in learnt:
+            member = self.islands[i].first + x.row
+            population.stale[member] |= x.updates > 0
+            if x.updates or x.failures:
+                population.failed[member] = 0 if x.updates else population.failed[member] + 1
+        return population, learnt, self.healed(population, learnt)
+
+    def healed(self, population: Population, learnt: list[tuple[int, Learning]]) -> list[Replacement]:
+        """Replaces members whose weights no update can move to finite ones; changes the population's arrays.
+
+        One update that was undone is bad luck, and the member goes on from its last good weights. If nothing but
+        such updates came twice in a row, it becomes a copy of its parent, or of the fittest of its island.
+        """
+        failed = [(self.islands[i], i, self.islands[i].first + x.row) for i, x in learnt if x.failures]
+        if failed:
+            who = ", ".join(str(member) for _, _, member in failed)
+            log.warning("Updates gave weights or a loss that are not finite, and were undone; of members: %s.", who)
+        replaced = []
+        for island, i, member in failed:
+            able = np.flatnonzero(population.failed[island.members] == 0) + island.first
+            if population.failed[member] < HOPELESS or len(able) == 0:
+                continue
+            parent = int(population.parent[member])
+            if parent not in able:
+                parent = int(able[np.argmax(population.fitness[able])])
+            replaced.append(self.replacement(population, i, member, parent, "not finite"))
+            log.warning("Member %d cannot learn from there any more; it becomes a copy of %d.", member, parent)
+        return replaced
 
     def renew(self, population: Population, rng: Generator) -> tuple[Population, list[Replacement]]:
         """Returns the population one epoch older, after at most ``replacements`` members were replaced.
@@ -55,7 +91,7 @@ class Coevolution(Fixed):
         many parents with replacement; a protected member keeps its place (paper, section on coevolution). Places change
         hands one after the other: a parent whose own place was just taken passes on what it became.
         """
-        population = replace(population, **{x: getattr(population, x).copy() for x in COPIED})
+        population = own(population)
         replaced: list[Replacement] = []
         for i in rng.permutation(len(self.islands)):
             left = self.replacements - len(replaced)
@@ -71,7 +107,7 @@ class Coevolution(Fixed):
             parents = everyone[rng.choice(len(everyone), size=count, p=likely)]
             for place, parent in zip(removed, parents, strict=True):
                 if population.age[place] > self.protect_new:
-                    replaced.append(self.replacement(population, int(i), int(place), int(parent)))
+                    replaced.append(self.replacement(population, int(i), int(place), int(parent), self.reason))
         older, _ = super().renew(population, rng)
         return older, replaced
 
@@ -87,24 +123,25 @@ class Coevolution(Fixed):
         candidates = np.sort(fittest_first[self.elites :])
         return candidates if self.draw_protected else candidates[population.age[candidates] > self.protect_new]
 
-    def replacement(self, population: Population, i: int, place: int, parent: int) -> Replacement:
+    def replacement(self, population: Population, i: int, place: int, parent: int, reason: str) -> Replacement:
         """Puts a copy of ``parent`` on ``place``; changes the arrays and minds of ``population``."""
         fitness = self.fitness.shown(population.fitness[[place, parent]])
-        record = Replacement(
-            i, place, parent, float(fitness[0]), float(fitness[1]), int(population.age[place]), self.reason
-        )
+        record = Replacement(i, place, parent, float(fitness[0]), float(fitness[1]), int(population.age[place]), reason)
         first = self.islands[i].first
         self.islands[i].learner.copy(population.minds[i], place - first, parent - first)
         population.fitness[place] = population.fitness[parent]
         population.behaviour[place] = population.behaviour[parent]
         population.stale[place] = population.stale[parent]
+        population.failed[place] = population.failed[parent]
         population.age[place] = 0
         population.games[place] = population.captain_games[place] = 0
         population.parent[place] = parent
         return record
 
 
-COPIED = ("fitness", "behaviour", "stale", "age", "games", "captain_games", "parent")
+def own(population: Population) -> Population:
+    """Returns the population with arrays of its own, which may be changed."""
+    return replace(population, **{x: getattr(population, x).copy() for x in ARRAYS})
 
 
 def empty() -> Floats:

@@ -33,11 +33,11 @@ class Fixed:
 
     def train(
         self, population: Population, experience: Experience, rng: Generator
-    ) -> tuple[Population, list[tuple[int, Learning]]]:
+    ) -> tuple[Population, list[tuple[int, Learning]], list[Replacement]]:
         """Returns the population as it is."""
-        return population, []
+        return population, [], []
 
-    def project(self, population: Population, probe: Probe) -> Population:
+    def project(self, population: Population, number: int, probe: Probe) -> Population:
         """Returns the population as it is."""
         return population
 

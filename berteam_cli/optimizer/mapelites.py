@@ -13,7 +13,7 @@ import numpy as np
 from berteam_cli.optimizer.aggression import aggression
 from berteam_cli.optimizer.base import Probe
 from berteam_cli.optimizer.coevolution import Coevolution, empty
-from berteam_cli.optimizer.removal import above_neighbours, crowded
+from berteam_cli.optimizer.removal import above_neighbours, nearest
 from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.population import Island, Population
 
@@ -26,20 +26,26 @@ class MapElites(Coevolution):
         radius: lambda, in units of aggression: who has nobody nearer is unique.
         opponents: (J, T) teams of fixed policies against which aggression is measured.
         probe_games: games against each of them.
+        project_every: epochs from one measurement to the next.
+        lambda_growth: where all are unique, the radius is multiplied by this until somebody is not; 1: never.
     """
 
     radius: float
     opponents: Ints
     probe_games: int
+    project_every: int
+    lambda_growth: float
 
     reason = "local fitness"
 
-    def project(self, population: Population, probe: Probe) -> Population:
-        """Returns the population with the aggression of the members that may matter now.
+    def project(self, population: Population, number: int, probe: Probe) -> Population:
+        """Returns the population with the aggression of the members that may matter in epoch ``number``.
 
-        Measured are members that played since their last measurement, on islands where somebody is old enough to be
-        replaced. A member is measured as a team made only of itself.
+        Measured are members whose policy changed since their last measurement, on islands where somebody is old enough
+        to be replaced, all in one batch of games. A member is measured as a team made only of itself.
         """
+        if number % self.project_every:
+            return population
         due = np.concatenate(
             [
                 island.first + np.flatnonzero(population.stale[island.members])
@@ -66,9 +72,13 @@ class MapElites(Coevolution):
         """
         if not (population.age[island.members] > self.protect_new).any():
             return np.zeros(0, dtype=np.int64), empty()
-        unsafe = island.first + np.flatnonzero(crowded(population.behaviour[island.members], self.radius))
-        candidates = np.intersect1d(self.candidates(population, island), unsafe)
+        allowed = self.candidates(population, island)
+        near, radius = nearest(population.behaviour[island.members])[allowed - island.first], self.radius
+        if self.lambda_growth > 1 and np.isfinite(near).any():
+            while not (near < radius).any():
+                radius *= self.lambda_growth
+        candidates = allowed[near < radius]
         if len(candidates) == 0:
             return candidates, empty()
-        better = above_neighbours(population.fitness[candidates], population.behaviour[candidates], self.radius)
+        better = above_neighbours(population.fitness[candidates], population.behaviour[candidates], radius)
         return candidates, self.fitness.removal_chances(better)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from berteam_cli.outcomes import Bools, Floats
+from berteam_cli.outcomes import Floats
 
 
-def crowded(behaviour: Floats, radius: float) -> Bools:
-    """Returns (K,) who has another nearer than ``radius``; the others are unique and safe.
+def nearest(behaviour: Floats) -> Floats:
+    """Returns (K,) how far the nearest other is; who has nobody nearer than the radius is unique and safe.
+
+    Infinity for who is alone or was never measured.
 
     Args:
-        behaviour: (K,) aggression, no unit.
-        radius: lambda of the paper, above 0.
+        behaviour: (K,) aggression, no unit; NaN where it was never measured.
     """
     apart = np.abs(behaviour[:, np.newaxis] - behaviour)
-    return (apart < radius).sum(axis=1) > 1  # everyone is near oneself
+    apart[np.isnan(apart)] = np.inf
+    np.fill_diagonal(apart, np.inf)
+    return apart.min(axis=1)
 
 
 def above_neighbours(fitness: Floats, behaviour: Floats, radius: float) -> Floats:

@@ -11,18 +11,22 @@ from berteam_cli.learner.temporal import schedule
 from berteam_cli.outcomes import Experience
 from berteam_cli.workers import Workers
 
+ACTIVATIONS = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 SMALL = Dqn(
     observation_size=9,
     actions=5,
     network=(16, 12),
+    activation="relu",
     learning_rate=1e-3,
     buffer_size=150,
     batch_size=8,
     gamma=0.9,
+    n_steps=1,
     train_freq=4,
     gradient_steps=1,
     learning_starts=20,
     target_update_interval=50,
+    tau=1.0,
     exploration_initial=1.0,
     exploration_final=0.1,
     exploration_steps=200,
@@ -49,9 +53,11 @@ def twin(sb3_model, load):
             buffer_size=dqn.buffer_size,
             batch_size=dqn.batch_size,
             gamma=dqn.gamma,
+            n_steps=dqn.n_steps,
+            tau=dqn.tau,
             target_update_interval=dqn.target_update_interval,
             max_grad_norm=dqn.max_grad_norm,
-            policy_kwargs={"net_arch": list(dqn.network)},
+            policy_kwargs={"net_arch": list(dqn.network), "activation_fn": ACTIVATIONS[dqn.activation]},
         )
         load(weights, dqn.sizes, model.q_net)
         load(target, dqn.sizes, model.q_net_target)
@@ -87,13 +93,19 @@ def sampler(model, batches, q_values):
 
 
 @pytest.mark.parametrize(
-    ("network", "max_grad_norm", "scale"), [((64, 64), 10.0, 1.0), ((96, 96), 0.05, 1.0), ((16,), 10.0, 4.0)]
+    ("network", "scale", "changes"),
+    [
+        ((64, 64), 1.0, {}),
+        ((96, 96), 1.0, {"max_grad_norm": 0.05}),
+        ((16,), 4.0, {}),
+        ((16, 12), 1.0, {"tau": 0.3, "activation": "tanh"}),
+        ((16, 12), 1.0, {"n_steps": 4}),
+        ((16,), 1.0, {"n_steps": 3, "buffer_size": 400}),
+    ],
 )
-def test_gradient_steps_are_those_of_stable_baselines(
-    twin, flat, random_games, monkeypatch, network, max_grad_norm, scale
-):
-    dqn = replace(SMALL, network=network, buffer_size=600, batch_size=32, max_grad_norm=max_grad_norm)
-    dqn = replace(dqn, learning_starts=100, target_update_interval=200)
+def test_gradient_steps_are_those_of_stable_baselines(twin, flat, random_games, monkeypatch, network, scale, changes):
+    dqn = replace(SMALL, network=network, buffer_size=600, batch_size=32)
+    dqn = replace(dqn, learning_starts=100, target_update_interval=200, **changes)
     state = grown(dqn, 2)
     games = random_games([[4, 8, 3, 5]] * 5, [120, 80, 100, 99, 103], [True, False, True, False, True])
     games.rewards[:] *= scale
@@ -104,7 +116,7 @@ def test_gradient_steps_are_those_of_stable_baselines(
     for row, (model, rng) in enumerate(zip(models, np.random.default_rng(3).spawn(2), strict=True)):
         remember(model, games, [(game, (0, 3)[row]) for game in range(5)])
         q_values = []
-        drawn = sampler(model, rng.integers(0, 502, (100, 32)), q_values)
+        drawn = sampler(model, rng.integers(0, min(502, dqn.buffer_size), (100, 32)), q_values)
         monkeypatch.setattr(model.replay_buffer, "sample", drawn)
         losses = []
         for t in range(1, 503):

@@ -18,6 +18,7 @@ SMALL = Ppo(
     observation_size=9,
     actions=5,
     network=(16, 12),
+    activation="tanh",
     learning_rate=1e-3,
     n_steps=50,
     minibatch_size=16,
@@ -25,11 +26,14 @@ SMALL = Ppo(
     gamma=0.9,
     gae_lambda=0.8,
     clip_range=0.2,
+    clip_range_vf=None,
+    target_kl=None,
     entropy_coef=0.01,
     value_coef=0.5,
     max_grad_norm=0.5,
     normalize_advantage=True,
 )
+ACTIVATIONS = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}
 LENGTHS, TERMINATED = [100, 90, 120], [True, False, True]  # 256 steps cut the third game
 
 
@@ -61,11 +65,13 @@ def twin(sb3_model, load):
             gamma=ppo.gamma,
             gae_lambda=ppo.gae_lambda,
             clip_range=ppo.clip_range,
+            clip_range_vf=ppo.clip_range_vf,
+            target_kl=ppo.target_kl,
             ent_coef=ppo.entropy_coef,
             vf_coef=ppo.value_coef,
             max_grad_norm=ppo.max_grad_norm,
             normalize_advantage=ppo.normalize_advantage,
-            policy_kwargs={"net_arch": list(ppo.network)},
+            policy_kwargs={"net_arch": list(ppo.network), "activation_fn": ACTIVATIONS[ppo.activation]},
         )
         cut = weight_count(np.array(ppo.policy_sizes))
         for own, (sizes, modules) in zip((weights[:cut], weights[cut:]), parts(ppo, model), strict=True):
@@ -132,6 +138,8 @@ def test_advantages_by_hand():
         ((96, 96), {"entropy_coef": 0.0, "learning_rate": 3e-4}),
         ((16,), {"minibatch_size": 60, "normalize_advantage": False, "clip_range": 0.05}),
         ((16, 12), {"minibatch_size": 255, "max_grad_norm": 1e-3}),
+        ((16, 12), {"activation": "relu", "clip_range_vf": 0.1}),
+        ((16, 12), {"target_kl": 0.001}),
     ],
 )
 def test_an_update_is_that_of_stable_baselines(twin, flat, random_games, monkeypatch, network, changes):
@@ -152,7 +160,9 @@ def test_an_update_is_that_of_stable_baselines(twin, flat, random_games, monkeyp
         assert np.abs(theirs - before[row]).max() > 10 * 1e-5
 
         log, ours = model.logger.name_to_value, figures[row]
-        assert (ours.row, ours.updates, ours.steps) == (row, 10 * -(-256 // ppo.minibatch_size), 310)
+        whole = 10 * -(-256 // ppo.minibatch_size)
+        assert (ours.row, ours.steps, ours.failures) == (row, 310, 0)
+        assert 0 < ours.updates < whole if ppo.target_kl else ours.updates == whole
         assert ours.policy_loss == pytest.approx(log["train/policy_gradient_loss"], abs=1e-5)
         assert ours.value_loss == pytest.approx(log["train/value_loss"], abs=1e-4)
         assert ours.entropy == pytest.approx(-log["train/entropy_loss"], abs=1e-5)

@@ -11,7 +11,11 @@ OTHERS = opponents((0, 1), 2)
 
 
 def mapelites(places, **settings):
-    return coevolution(places, MapElites, **({"radius": 1.0, "opponents": OTHERS, "probe_games": 1} | settings))
+    return coevolution(
+        places,
+        MapElites,
+        **({"radius": 1.0, "opponents": OTHERS, "probe_games": 1, "project_every": 1, "lambda_growth": 1.0} | settings),
+    )
 
 
 def measured(places, fitness, behaviour, age=9):
@@ -59,7 +63,36 @@ def test_only_the_crowd_competes():
         assert [x.removed for x in replaced] == [1]
 
 
-def test_projection_measures_those_who_played_where_somebody_is_old_enough():
+def test_where_all_are_unique_lambda_grows_until_the_nearest_are_not():
+    # Gaps of 2 and 3: with 1, 1.5, 2.25 the first two meet; member 2 stays alone, and 0 is the elite.
+    places = islands(3)
+    people = measured(places, [50.0, 0, -50], [0.0, 2, 5])
+    for seed in range(10):
+        _, replaced = mapelites(places, lambda_growth=1.5).renew(people, np.random.default_rng(seed))
+        assert [x.removed for x in replaced] == [1]
+
+
+def test_lambda_does_not_grow_over_who_was_never_measured():
+    places = islands(2)
+    people = measured(places, 0.0, [np.nan, 1.0])
+    assert mapelites(places, lambda_growth=2.0).renew(people, np.random.default_rng(0))[1] == []
+
+
+def test_projection_comes_every_so_many_epochs():
+    places = islands(2)
+    people = population(places, 0.0, 9)
+    counted = []
+
+    def probe(population, teams, others, each):
+        counted.append(len(teams))
+        return outcomes(np.stack([teams, others], axis=1), np.full((len(teams), 2), 0.5))
+
+    for number in range(1, 7):
+        mapelites(places, project_every=3).project(people, number, probe)
+    assert counted == [6, 6]  # epochs 3 and 6; two members against three teams
+
+
+def test_projection_measures_whose_policy_changed_where_somebody_is_old_enough():
     places = islands(2, 2)
     people = population(places, 0.0, [9, 0, 5, 5])  # nobody of the second island is older than 5
     people.stale[:] = [True, False, True, True]
@@ -72,11 +105,11 @@ def test_projection_measures_those_who_played_where_somebody_is_old_enough():
         events[:, 0, 0] = others[:, 0]  # one capture if the opponents' first is policy 1
         return outcomes(np.stack([teams, others], axis=1), np.full((len(teams), 2), 0.5), events=events)
 
-    after = mapelites(places, probe_games=2).project(people, probe)
+    after = mapelites(places, probe_games=2).project(people, 1, probe)
     teams, others = asked[0]
     np.testing.assert_array_equal(teams, np.zeros((6, 2)))  # member 0 twice, each of three teams twice
     np.testing.assert_array_equal(others, np.repeat(OTHERS, 2, axis=0))
     assert after.behaviour[0] == (1 + 1 + 3) / 3
     assert np.isnan(after.behaviour[1:]).all()
     np.testing.assert_array_equal(after.stale, [False, False, True, True])
-    assert mapelites(places).project(after, probe) is after  # nothing is due now
+    assert mapelites(places).project(after, 2, probe) is after  # nothing is due now

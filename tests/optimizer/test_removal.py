@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 from berteam_cli.optimizer.fitness import CaptainElo
-from berteam_cli.optimizer.removal import above_neighbours, crowded
+from berteam_cli.optimizer.removal import above_neighbours, nearest
 from tests.strategies import floats
 
 
@@ -12,17 +11,16 @@ def test_by_hand():
     # Radius 1: means 2, 3, 5, 6 of neighbours, so -1, 0, 0, 1 above them; the last is alone.
     fitness, behaviour = np.array([1.0, 3, 5, 7]), np.array([0.0, 0.5, 1.5, 2])
     np.testing.assert_allclose(above_neighbours(fitness, behaviour, 1.0), [-1, 0, 0, 1])
-    np.testing.assert_array_equal(crowded(np.append(behaviour, 9), 1.0), [True, True, True, True, False])
+    np.testing.assert_array_equal(nearest(np.append(behaviour, 9)), [0.5, 0.5, 0.5, 0.5, 7])
 
 
-def test_exactly_at_the_radius_is_unique_but_a_neighbour():
-    behaviour = np.array([0.0, 1.0])
-    assert not crowded(behaviour, 1.0).any()
-    np.testing.assert_allclose(above_neighbours(np.array([0.0, 1]), behaviour, 1.0), [-0.5, 0.5])
+def test_exactly_at_the_radius_is_a_neighbour():
+    np.testing.assert_allclose(above_neighbours(np.array([0.0, 1]), np.array([0.0, 1.0]), 1.0), [-0.5, 0.5])
 
 
 def test_who_was_never_measured_is_unique():
-    np.testing.assert_array_equal(crowded(np.array([np.nan, 0.0, 0.1]), 1.0), [False, True, True])
+    np.testing.assert_allclose(nearest(np.array([np.nan, 0.0, 0.1])), [np.inf, 0.1, 0.1])
+    np.testing.assert_array_equal(nearest(np.array([2.0])), [np.inf])
 
 
 @given(floats(5), floats(5))
@@ -34,11 +32,10 @@ def test_when_all_are_near_it_is_coevolution(fitness, behaviour):
     np.testing.assert_allclose(rule.removal_chances(better), rule.removal_chances(fitness))
 
 
-@given(floats(6, 0, 3), st.floats(0.1, 2))
-def test_crowded_means_somebody_is_near(behaviour, radius):
-    for k, is_crowded in enumerate(crowded(behaviour, radius)):
-        others = np.delete(behaviour, k)
-        assert is_crowded == (np.abs(others - behaviour[k]) < radius).any()
+@given(floats(6, 0, 3))
+def test_nearest_is_the_nearest_other(behaviour):
+    for k, distance in enumerate(nearest(behaviour)):
+        assert distance == np.abs(np.delete(behaviour, k) - behaviour[k]).min()
 
 
 def test_removal_needs_a_rule_of_its_own_fitness():
