@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -94,6 +94,11 @@ class Dqn:
         """Whether hidden layers use tanh, else ReLU."""
         return self.activation == "tanh"
 
+    @property
+    def adam(self) -> Adam:
+        """The settings of the optimizer."""
+        return Adam(self.learning_rate, ADAM_EPSILON, self.max_grad_norm)
+
     def init(self, members: int, rng: Generator) -> DqnState:
         """Returns the state of ``members`` members that have not learnt yet."""
         weights = uniform(self.sizes, members, rng)
@@ -137,33 +142,36 @@ class Dqn:
     def member_learns(self, state: DqnState, row: int, before: int, rng: Generator) -> Learning:
         """Takes the gradient steps for the steps a member has made since it had made ``before``."""
         after = int(state.collected[row])
-        each = self.train_freq if self.gradient_steps == -1 else self.gradient_steps
-        count, renewals = schedule(
-            before, after, self.train_freq, each, self.learning_starts, self.target_update_interval
-        )
-        figures = guarded(
-            (*state.trained, state.target),
-            row,
-            lambda: self.steps_taken(state, row, count, renewals, rng),
-        )
-        epsilon = float(self.epsilon(state.collected[row]))
+        count, renewals = self.plan(before, after)
+        batches = self.batches(after, count, rng)
+        columns = (*state.trained, state.target)
+        figures = guarded(columns, row, lambda: self.steps_taken(state, row, batches, renewals))
+        learning = Learning(row, epsilon=float(self.epsilon(state.collected[row])), steps=after - before)
         if figures is None:
-            return Learning(row, epsilon=epsilon, steps=after - before, failures=1)
+            return replace(learning, failures=1)
         means = dict(zip(("loss", "q_value"), figures.tolist(), strict=True)) if count else {}
-        return Learning(row, updates=count, epsilon=epsilon, steps=after - before, **means)
+        return replace(learning, updates=count, **means)
 
-    def steps_taken(self, state: DqnState, row: int, count: int, renewals: Bools, rng: Generator) -> Floats:
-        """Takes ``count`` gradient steps of one member; returns the means of loss and of Q."""
-        collected = int(state.collected[row])
+    def plan(self, before: int, after: int) -> tuple[int, Bools]:
+        """Returns how many gradient steps are due after step ``after``, and when targets are renewed; ``schedule``."""
+        each = self.train_freq if self.gradient_steps == -1 else self.gradient_steps
+        return schedule(before, after, self.train_freq, each, self.learning_starts, self.target_update_interval)
+
+    def batches(self, collected: int, count: int, rng: Generator) -> Ints:
+        """Returns (count, batch_size) places in the ring of a member that has ``collected`` so many steps."""
+        return rng.integers(0, min(collected, self.buffer_size), (count, self.batch_size))
+
+    def steps_taken(self, state: DqnState, row: int, batches: Ints, renewals: Bools) -> Floats:
+        """Takes a gradient step of one member for each of ``batches``; returns the means of loss and of Q."""
         return learn_steps(
             Difference(self.gamma, self.n_steps, self.tau, self.smooth),
-            Adam(self.learning_rate, ADAM_EPSILON, self.max_grad_norm),
+            self.adam,
             state.trained.member(row),
             state.target[row],
             np.array(self.sizes),
             state.replay.member(row),
-            (collected - 1) % self.buffer_size,
-            rng.integers(0, min(collected, self.buffer_size), (count, self.batch_size)),
+            (int(state.collected[row]) - 1) % self.buffer_size,
+            batches,
             renewals,
         )
 

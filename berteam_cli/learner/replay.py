@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from berteam_cli.learner.mlp import Singles
-from berteam_cli.outcomes import Bools, Experience
+from berteam_cli.outcomes import Bools, Experience, Ints
 
 
 class Replay(NamedTuple):
@@ -63,13 +63,22 @@ def remember(ring: Replay, collected: int, experience: Experience, game: int, pl
     Returns:
         How many steps the member has made now.
     """
-    room, length = len(ring.actions), int(experience.lengths[game])
+    at, new = latest(len(ring.actions), collected, experience, game, player)
+    for kept, column in zip(ring, new, strict=True):
+        kept[at] = column
+    return collected + int(experience.lengths[game])
+
+
+def latest(room: int, collected: int, experience: Experience, game: int, player: int) -> tuple[Ints, Replay]:
+    """Returns where the steps of one trajectory go in a ring of ``room`` steps, (n,), and the steps."""
+    length = int(experience.lengths[game])
     steps = np.arange(max(0, length - room), length)  # of more than fit, the last ones stay
-    at = (collected + steps) % room
-    ring.observations[at] = experience.observations[game, player, steps]
-    ring.next_observations[at] = experience.observations[game, player, steps + 1]
-    ring.actions[at] = experience.actions[game, player, steps]
-    ring.rewards[at] = experience.rewards[game, player, steps]
-    ring.ends[at] = steps == length - 1
-    ring.terminated[at] = ring.ends[at] & experience.terminated[game]
-    return collected + length
+    ends = steps == length - 1
+    return (collected + steps) % room, Replay(
+        experience.observations[game, player, steps],
+        experience.observations[game, player, steps + 1],
+        experience.actions[game, player, steps],
+        experience.rewards[game, player, steps],
+        ends & experience.terminated[game],
+        ends,
+    )

@@ -1,0 +1,155 @@
+"""DQN of ``dqn.py`` for all members of an island in one batch on a device such as a GPU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.random import Generator
+from torch import Tensor
+from torch.nn.functional import smooth_l1_loss
+
+from berteam_cli.acting import Policies
+from berteam_cli.learner.adam import Trained
+from berteam_cli.learner.base import Learning
+from berteam_cli.learner.dqn import Dqn, DqnState
+from berteam_cli.learner.replay import Replay, latest
+from berteam_cli.learner.stacked import descend, on, outputs, put_where_finite, taken
+from berteam_cli.outcomes import Bools, Experience, Ints
+from berteam_cli.workers import Workers
+
+
+@dataclass(frozen=True)
+class StackedDqn(Dqn):
+    """DQN whose state lies on a device; it takes the same minibatches as ``Dqn`` and differs from it by rounding only.
+
+    Attributes:
+        device: of torch.
+    """
+
+    device: str
+
+    def init(self, members: int, rng: Generator) -> DqnState:
+        """Returns the state of ``members`` members that have not learnt yet."""
+        return self.restored(Dqn.tensors(self, super().init(members, rng)))
+
+    def policies(self, state: DqnState, *, explore: bool) -> Policies:
+        """Returns the members' greedy policies, which err at random as their schedules say if they ``explore``."""
+        weights = state.trained.weights.cpu().numpy()
+        return super().policies(state._replace(trained=state.trained._replace(weights=weights)), explore=explore)
+
+    def learn(
+        self, state: DqnState, experience: Experience, first: int, rng: Generator, workers: Workers
+    ) -> list[Learning]:
+        """Adds the members' steps to their replay buffers; then all take the gradient steps these allow, together.
+
+        Changes ``state``.
+        """
+        rngs = rng.spawn(len(state.collected))
+        trajectories = experience.trajectories(first, len(state.collected))
+        rows = list(trajectories)
+        if not rows:
+            return []
+        before = state.collected.copy()
+        for row, games in trajectories.items():
+            for game, player in games:
+                at, new = latest(self.buffer_size, int(state.collected[row]), experience, game, player)
+                for kept, column in zip(state.replay, new, strict=True):
+                    kept[row, on(self.device, at)] = on(self.device, column)
+                state.collected[row] += experience.lengths[game]
+        plans = [self.plan(int(before[row]), int(state.collected[row])) for row in rows]
+        batches = [
+            self.batches(int(state.collected[row]), count, rngs[row])
+            for row, (count, _) in zip(rows, plans, strict=True)
+        ]
+        figures, sound = self.stepped(state, rows, batches, [renewals for _, renewals in plans])
+        learnt = []
+        for row, (count, _), numbers, well in zip(rows, plans, figures, sound, strict=True):
+            means = dict(zip(("loss", "q_value"), numbers, strict=True)) if count and well else {}
+            steps, epsilon = int(state.collected[row] - before[row]), float(self.epsilon(state.collected[row]))
+            learnt.append(Learning(row, count * well, **means, epsilon=epsilon, steps=steps, failures=int(not well)))
+        return learnt
+
+    def stepped(
+        self, state: DqnState, rows: list[int], batches: list[Ints], renewals: list[Bools]
+    ) -> tuple[list[list[float]], list[bool]]:
+        """Takes gradient steps of the members ``rows``, some more than others.
+
+        Args:
+            state: changed.
+            rows: K members.
+            batches: for each (k, n) places in its ring.
+            renewals: for each (k + 1,) as ``temporal.schedule`` gives them.
+
+        Returns:
+            For each the means of loss and of Q; and whether all is finite; if not, it stays as it was.
+        """
+        counts = on(self.device, np.array([len(x) for x in batches]))
+        most = max(len(x) for x in batches)
+        at = np.zeros((len(rows), most, self.batch_size), dtype=np.int64)
+        renews = np.zeros((len(rows), most + 1), dtype=np.bool_)
+        for k, (places, targets) in enumerate(zip(batches, renewals, strict=True)):
+            at[k, : len(places)], renews[k, : len(targets)] = places, targets
+        chosen = torch.tensor(rows, device=self.device)
+        newest = on(self.device, (state.collected[rows] - 1) % self.buffer_size)
+        trained = Trained(*taken(state.trained, chosen))
+        target = state.target[chosen]
+        sums = torch.zeros(len(rows), 2, dtype=torch.float64, device=self.device)
+        places, renewing = on(self.device, at), on(self.device, renews)
+        for step in range(most + 1):
+            target += torch.where(renewing[:, step, None], self.tau * (trained.weights - target), 0.0)
+            if step == most:
+                break
+            active = step < counts
+            gradient, figures = self.gradient(state, chosen, newest, places[:, step], trained.weights, target)
+            sums += torch.where(active[:, None], figures, 0.0)
+            descend(self.adam, trained, gradient, active)
+        means = sums / counts.clamp(min=1)[:, None]
+        sound = put_where_finite((*state.trained, state.target), chosen, (*trained, target), means)
+        return means.tolist(), sound
+
+    def gradient(
+        self, state: DqnState, rows: Tensor, newest: Tensor, at: Tensor, weights: Tensor, target: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Returns the gradients (K, W) of the members' losses, and their losses and mean Q, (K, 2).
+
+        Args:
+            state: of the island.
+            rows: (K,) members.
+            newest: (K,) where in its ring each member's last step is.
+            at: (K, n) places in their rings.
+            weights: (K, W).
+            target: (K, W).
+        """
+        ring, who = state.replay, rows[:, None]
+        last, goals, discounts = at, ring.rewards[who, at], torch.full_like(at, self.gamma, dtype=torch.float32)
+        for _ in range(1, self.n_steps):
+            goes_on = ~(ring.ends[who, last] | (last == newest[:, None]))
+            last = torch.where(goes_on, (last + 1) % self.buffer_size, last)
+            goals = goals + torch.where(goes_on, discounts * ring.rewards[who, last], 0.0)
+            discounts = torch.where(goes_on, discounts * self.gamma, discounts)
+        future = outputs(target, self.sizes, self.smooth, ring.next_observations[who, last]).amax(dim=2)
+        goals = goals + torch.where(ring.terminated[who, last], 0.0, discounts * future)
+        weights = weights.detach().requires_grad_()
+        q = outputs(weights, self.sizes, self.smooth, ring.observations[who, at])
+        q = q.gather(2, ring.actions[who, at].long()[..., None])[..., 0]
+        loss = smooth_l1_loss(q, goals, reduction="none").mean(dim=1)
+        (gradient,) = torch.autograd.grad(loss.sum(), weights)
+        return gradient, torch.stack([loss, q.mean(dim=1)], dim=1).detach().double()
+
+    def tensors(self, state: DqnState) -> dict[str, Any]:
+        """Returns all that ``state`` holds, by name."""
+        columns = {**state.trained._asdict(), "target": state.target, **state.replay._asdict()}
+        return {**columns, "collected": torch.from_numpy(state.collected)}
+
+    def restored(self, tensors: dict[str, Any]) -> DqnState:
+        """Returns the state that ``tensors`` gave these, on the device."""
+        moved = {name: tensor.to(self.device, copy=True) for name, tensor in tensors.items() if name != "collected"}
+        return DqnState(
+            Trained(*(moved[name] for name in Trained._fields)),
+            moved["target"],
+            Replay(*(moved[name] for name in Replay._fields)),
+            tensors["collected"].cpu().numpy().copy(),
+        )
