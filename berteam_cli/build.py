@@ -12,7 +12,7 @@ from typing import Any
 import torch
 
 from berteam_cli.config import CommandConfig, EnvConfig, IslandConfig, LearnerConfig, OptimizerConfig, TrainConfig
-from berteam_cli.env.base import Env
+from berteam_cli.env.base import Env, blank_trajectories
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.env.rps import Rps
@@ -22,6 +22,9 @@ from berteam_cli.learner.base import Learner
 from berteam_cli.learner.dqn import Dqn
 from berteam_cli.learner.fixed import Fixed as FixedLearner
 from berteam_cli.learner.ppo import Ppo
+from berteam_cli.learner.stacked_dqn import StackedDqn
+from berteam_cli.learner.stacked_ppo import StackedPpo
+from berteam_cli.memory import check_memory
 from berteam_cli.optimizer.aggression import opponents
 from berteam_cli.optimizer.base import Optimizer
 from berteam_cli.optimizer.coevolution import Coevolution
@@ -41,6 +44,7 @@ SELECTORS: dict[str, Callable[..., Selector[Any]]] = {"uniform": Uniform, "mcaa"
 NO_NAMES = {"na", "nan", "null", "none", "n-a", "other"}  # pandas reads most of these as nothing
 
 LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": Ppo, "dqn": Dqn}
+STACKED_LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": StackedPpo, "dqn": StackedDqn}
 
 
 def games(config: CommandConfig) -> Games:
@@ -71,19 +75,23 @@ def parts(config: TrainConfig) -> Parts:
     """
     playing = games(config)
     device = chosen_device(config.device)
-    islands = archipelago(config, playing.env)
+    islands = archipelago(config, playing.env, device)
     members = sum(island.size for island in islands)
     if config.team_size > members:
         raise InputError(
             f"team_size must be at most {members}, the members of the population, but is {config.team_size}."
         )
     field = Field(island_of(islands), config.team_size)
+    improving = optimizer(config, islands, playing)
+    games_kept = config.games_per_epoch if improving.learns else 0
+    check_memory(islands, playing.env, games_kept)
     return Parts(
         seed=config.seed,
         games_per_epoch=config.games_per_epoch,
         games=playing,
         selector=selector(config, field, device),
-        optimizer=optimizer(config, islands, playing),
+        optimizer=improving,
+        room=blank_trajectories(playing.env, games_kept) if games_kept else None,
     )
 
 
@@ -99,7 +107,7 @@ def chosen_device(name: str) -> str:
     return "cuda" if there and name != "cpu" else "cpu"
 
 
-def archipelago(config: TrainConfig, game: Env) -> tuple[Island, ...]:
+def archipelago(config: TrainConfig, game: Env, device: str) -> tuple[Island, ...]:
     """Returns the islands of the population, one after the other.
 
     Raises:
@@ -114,7 +122,8 @@ def archipelago(config: TrainConfig, game: Env) -> tuple[Island, ...]:
         if settings.learner.name == "fixed":
             made = fixed_members(settings, game, key)
         else:
-            made = learner(settings.learner, game, key)
+            typed = len(config.population.islands) == 1 and settings.learner == config.learner
+            made = learner(settings.learner, game, "learner" if typed else f"{key}.learner", device)
         islands.append(Island(name, first, settings.size, made))
     if not islands:
         raise InputError("population.islands must have at least one island, but has none.")
@@ -147,23 +156,49 @@ def check_policies(names: list[str], game: Env, key: str) -> None:
             raise InputError.choice(f"{key} (with env={game.name})", name, game.fixed_policies)
 
 
-def learner(config: LearnerConfig, game: Env, key: str) -> Learner[Any]:
+def learner(config: LearnerConfig, game: Env, key: str, device: str) -> Learner[Any]:
     """Returns a learner of networks.
 
+    Args:
+        config: its settings.
+        game: what it learns.
+        key: of its settings, for messages.
+        device: "cpu", where compiled functions learn, or "cuda", where torch does.
+
     Raises:
-        InputError: its network is not one.
+        InputError: its settings do not go together.
     """
     settings = asdict(config)
     name = settings.pop("name")
     network = settings.pop("network")
     if not 1 <= len(network) <= 6 or not all(1 <= width <= 4096 for width in network):
-        raise InputError(f"{key}.learner.network must be 1 to 6 widths from 1 to 4096, but is {network}.")
-    return LEARNERS[name](
+        raise InputError(f"{key}.network must be 1 to 6 widths from 1 to 4096, but is {network}.")
+    check_settings(settings, key)
+    if device != "cpu":
+        settings["device"] = device
+    return (LEARNERS if device == "cpu" else STACKED_LEARNERS)[name](
         observation_size=game.observation_size,
         actions=game.actions,
         network=tuple(network),
         **settings,
     )
+
+
+def check_settings(settings: dict[str, Any], key: str) -> None:
+    """Checks that the settings of a learner go together.
+
+    Raises:
+        InputError: they do not.
+    """
+    steps, minibatch = settings.get("n_steps"), settings.get("minibatch_size")
+    if steps is not None and minibatch is not None and steps % minibatch:
+        less, more = steps // minibatch * minibatch, -(-steps // minibatch) * minibatch
+        near = f"{less} or {more}" if less else f"{more}"
+        raise InputError(
+            f"{key}.n_steps must be a multiple of {key}.minibatch_size={minibatch}, such as {near}, but is {steps}."
+        )
+    if settings.get("gradient_steps") == 0:
+        raise InputError(f"{key}.gradient_steps must be >= 1, or -1 for as many as transitions, but is 0.")
 
 
 def selector(config: TrainConfig, field: Field, device: str) -> Selector[Any]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from berteam_cli.acting import Policies
-from berteam_cli.env.base import Env, Results, Stoppable, blank_results
+from berteam_cli.env.base import Env, Results, Stoppable, Trajectories, blank_results
 from berteam_cli.outcomes import NOBODY, Bools, Experience, Ints, Lineups, Outcomes
 from berteam_cli.workers import Workers
 from mctf.draws import seed_of
@@ -29,7 +29,13 @@ class Games:
     workers: Workers
 
     def play(
-        self, policies: Policies, lineups: Lineups, key: int, *, record: bool = False
+        self,
+        policies: Policies,
+        lineups: Lineups,
+        key: int,
+        *,
+        record: bool = False,
+        room: Trajectories | None = None,
     ) -> tuple[Outcomes, Experience]:
         """Returns the outcomes of all ``lineups``, and what the players saw and did.
 
@@ -41,13 +47,14 @@ class Games:
             lineups: B games.
             key: below 2**63; games of the same key and index draw the same.
             record: whether anyone will learn; else the experience has no rows.
+            room: for the trajectories of B games; what was in it is overwritten. None makes a new one.
 
         Where players may leave a game early, the experience has a row for each player of each game, (B * V, 1).
         """
         games = len(lineups)
         players = np.ascontiguousarray(lineups.teams.reshape(games, 2 * self.env.team_size))
         seeds = seeds_of(key, games)
-        results = blank_results(self.env, games, record=record)
+        results = blank_results(self.env, games, record=record, room=room)
         each = min(GAMES_A_CALL, max(1, games // CALLS))
         try:
             self.workers.map(

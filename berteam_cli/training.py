@@ -10,6 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.acting import fixed_policies, joined
+from berteam_cli.env.base import Trajectories
 from berteam_cli.games import Games, as_side_0, both_sides
 from berteam_cli.learner.base import Learning
 from berteam_cli.optimizer.base import Optimizer, Replacement
@@ -22,13 +23,23 @@ FOUNDING, EPOCHS, RECORDS, EVALUATION = range(4)  # what a stream of random numb
 
 @dataclass(frozen=True)
 class Parts:
-    """What does not change in a run."""
+    """What does not change in a run.
+
+    Attributes:
+        seed: of all chance.
+        games_per_epoch: B.
+        games: what is played.
+        selector: who chooses teams.
+        optimizer: what makes members better.
+        room: where the trajectories of an epoch's games go, the same in every epoch; None where nobody learns.
+    """
 
     seed: int
     games_per_epoch: int
     games: Games
     selector: Selector[Any]
     optimizer: Optimizer
+    room: Trajectories | None
 
 
 @dataclass(frozen=True)
@@ -83,7 +94,7 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     lineups = selector.select(run.selection, parts.games_per_epoch, population.age, select)
     clock.lap("select_s")
     acting = policies(optimizer.islands, population, explore=True)
-    outcomes, experience = parts.games.play(acting, lineups, key(play), record=optimizer.learns)
+    outcomes, experience = parts.games.play(acting, lineups, key(play), record=optimizer.learns, room=parts.room)
     population = optimizer.rate(population, outcomes)
     clock.lap("play_s")
     population, learnt, healed = optimizer.train(population, experience, learn)

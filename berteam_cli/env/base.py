@@ -90,17 +90,41 @@ class Stoppable(Protocol):
         """Ends games that other threads play, since nobody waits for them any more; no more can be played."""
 
 
-def blank_results(env: Env, games: int, *, record: bool) -> Results:
-    """Returns room for the results of ``games`` games, and for their trajectories if ``record``."""
-    players, kept = 2 * env.team_size, games if record else 0
+class Trajectories(NamedTuple):
+    """Room for what the players of a batch of games see and do; fields as of Results."""
+
+    observations: npt.NDArray[np.float32]
+    actions: npt.NDArray[np.int16]
+    rewards: npt.NDArray[np.float32]
+    lengths: Ints
+    ended: Bools
+
+
+def blank_trajectories(env: Env, games: int) -> Trajectories:
+    """Returns room for the trajectories of ``games`` games; the memory is taken when they are written."""
+    players = 2 * env.team_size
+    return Trajectories(
+        observations=np.empty((games, players, env.longest + 1, env.observation_size), dtype=np.float32),
+        actions=np.empty((games, players, env.longest), dtype=np.int16),
+        rewards=np.empty((games, players, env.longest), dtype=np.float32),
+        lengths=np.zeros((games, players), dtype=np.int64),
+        ended=np.zeros((games, players), dtype=np.bool_),
+    )
+
+
+def trajectory_bytes(env: Env, games: int) -> int:
+    """Returns how much memory ``blank_trajectories`` takes when all games are as long as they can be."""
+    a_step = 4 * env.observation_size + 2 + 4
+    return games * 2 * env.team_size * (env.longest * a_step + 4 * env.observation_size + 8 + 1)
+
+
+def blank_results(env: Env, games: int, *, record: bool, room: Trajectories | None = None) -> Results:
+    """Returns room for the results of ``games`` games; if ``record`` trajectories go to ``room``, or to a new one."""
+    trajectories = room if record and room is not None else blank_trajectories(env, games if record else 0)
     return Results(
-        scores=np.zeros((games, 2)),
-        steps=np.zeros(games, dtype=np.int64),
-        events=np.zeros((games, 2, len(EVENTS)), dtype=np.int64),
-        terminated=np.zeros(games, dtype=np.bool_),
-        observations=np.empty((kept, players, env.longest + 1, env.observation_size), dtype=np.float32),
-        actions=np.empty((kept, players, env.longest), dtype=np.int16),
-        rewards=np.empty((kept, players, env.longest), dtype=np.float32),
-        lengths=np.zeros((kept, players), dtype=np.int64),
-        ended=np.zeros((kept, players), dtype=np.bool_),
+        np.zeros((games, 2)),
+        np.zeros(games, dtype=np.int64),
+        np.zeros((games, 2, len(EVENTS)), dtype=np.int64),
+        np.zeros(games, dtype=np.bool_),
+        *trajectories,
     )

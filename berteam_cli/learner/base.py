@@ -55,12 +55,16 @@ class Learner(Protocol[S]):
     """
 
     algorithm: str
+    buffer: str  # the setting that says how many steps a member keeps; empty where it keeps none
 
     def init(self, members: int, rng: Generator) -> S:
         """Returns the state of ``members`` members that have not learnt yet."""
 
     def policies(self, state: S, *, explore: bool) -> Policies:
         """Returns how the members act; without ``explore`` as they are evaluated."""
+
+    def state_bytes(self, members: int) -> int:
+        """Returns how much memory the state of so many members takes."""
 
     def names(self, state: S, island: str) -> list[str]:
         """Returns what to call the members of ``island``; a copy of a fixed policy has that policy's name."""

@@ -13,7 +13,7 @@ from berteam_cli.acting import GREEDY, Policies, networks
 from berteam_cli.learner.adam import Adam, Trained, untrained
 from berteam_cli.learner.base import Learning
 from berteam_cli.learner.health import guarded
-from berteam_cli.learner.mlp import Singles, layers, uniform
+from berteam_cli.learner.mlp import Singles, layers, uniform, weight_count
 from berteam_cli.learner.replay import Replay, empty, remember
 from berteam_cli.learner.temporal import Difference, learn_steps, schedule
 from berteam_cli.outcomes import Bools, Experience, Floats, Ints
@@ -83,6 +83,7 @@ class Dqn:
     max_grad_norm: float
 
     algorithm: ClassVar[str] = "dqn"
+    buffer: ClassVar[str] = "buffer_size"
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -114,6 +115,11 @@ class Dqn:
         """Returns the members' greedy policies, which err at random as their schedules say if they ``explore``."""
         chance = self.epsilon(state.collected) if explore else 0.0
         return networks(GREEDY, layers(state.trained.weights, self.sizes), tanh=self.smooth, epsilon=chance)
+
+    def state_bytes(self, members: int) -> int:
+        """Returns the bytes of both networks' weights with Adam's moments, and of the replay buffers."""
+        a_step = 2 * 4 * self.observation_size + 2 + 4 + 2
+        return members * (4 * 4 * int(weight_count(np.array(self.sizes))) + 8 + self.buffer_size * a_step + 8)
 
     def names(self, state: DqnState, island: str) -> list[str]:
         """Returns the island's name with the member's number in it."""

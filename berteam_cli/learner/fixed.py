@@ -28,6 +28,7 @@ class Fixed:
     policies_by_name: tuple[str, ...]
 
     algorithm: ClassVar[str] = "fixed"
+    buffer: ClassVar[str] = ""
 
     def init(self, members: int, rng: Generator) -> Ints:
         """Returns the policies' indices; draws nothing."""
@@ -38,6 +39,10 @@ class Fixed:
     def policies(self, state: Ints, *, explore: bool) -> Policies:
         """Returns the fixed policies, which are the same whether they ``explore`` or not."""
         return fixed_policies(state)
+
+    def state_bytes(self, members: int) -> int:
+        """Returns the bytes of the indices."""
+        return 8 * members
 
     def names(self, state: Ints, island: str) -> list[str]:
         """Returns the names of the policies."""

@@ -80,6 +80,7 @@ class Ppo:
     normalize_advantage: bool
 
     algorithm: ClassVar[str] = "ppo"
+    buffer: ClassVar[str] = "n_steps"
 
     @property
     def policy_sizes(self) -> tuple[int, ...]:
@@ -120,6 +121,12 @@ class Ppo:
     def policies(self, state: PpoState, *, explore: bool) -> Policies:
         """Returns the members' stochastic policies; they are evaluated as they play, whatever ``explore`` is."""
         return networks(SAMPLED, layers(state.trained.weights, self.policy_sizes), tanh=self.smooth)
+
+    def state_bytes(self, members: int) -> int:
+        """Returns the bytes of weights with Adam's moments, and of rollouts."""
+        weights = weight_count(np.array(self.policy_sizes)) + weight_count(np.array(self.value_sizes))
+        a_step = 4 * self.observation_size + 2 + 4 * 4 + 1
+        return members * (3 * 4 * int(weights) + 8 + self.n_steps * a_step + 8)
 
     def names(self, state: PpoState, island: str) -> list[str]:
         """Returns the island's name with the member's number in it."""

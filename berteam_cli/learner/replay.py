@@ -38,15 +38,15 @@ class Replay(NamedTuple):
 
 
 def empty(members: int, length: int, observation_size: int) -> Replay:
-    """Returns rings of ``length`` steps; the memory is taken as they fill."""
+    """Returns rings of ``length`` steps; all their memory is taken now, so that a run that begins can also end."""
     shape = (members, length)
     return Replay(
-        observations=np.zeros((*shape, observation_size), dtype=np.float32),
-        next_observations=np.zeros((*shape, observation_size), dtype=np.float32),
-        actions=np.zeros(shape, dtype=np.int16),
-        rewards=np.zeros(shape, dtype=np.float32),
-        terminated=np.zeros(shape, dtype=np.bool_),
-        ends=np.zeros(shape, dtype=np.bool_),
+        observations=np.full((*shape, observation_size), 0.0, dtype=np.float32),
+        next_observations=np.full((*shape, observation_size), 0.0, dtype=np.float32),
+        actions=np.full(shape, 0, dtype=np.int16),
+        rewards=np.full(shape, 0.0, dtype=np.float32),
+        terminated=np.full(shape, False, dtype=np.bool_),
+        ends=np.full(shape, False, dtype=np.bool_),
     )
 
 

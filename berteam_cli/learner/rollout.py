@@ -52,16 +52,16 @@ class Seen(NamedTuple):
 
 
 def empty(members: int, length: int, observation_size: int) -> Steps:
-    """Returns room for ``length`` steps of each member."""
+    """Returns room for ``length`` steps of each member; all its memory is taken now."""
     shape = (members, length)
     return Steps(
-        observations=np.zeros((*shape, observation_size), dtype=np.float32),
-        actions=np.zeros(shape, dtype=np.int16),
-        rewards=np.zeros(shape, dtype=np.float32),
-        values=np.zeros(shape, dtype=np.float32),
-        log_probs=np.zeros(shape, dtype=np.float32),
-        next_values=np.zeros(shape, dtype=np.float32),
-        ends=np.zeros(shape, dtype=np.bool_),
+        observations=np.full((*shape, observation_size), 0.0, dtype=np.float32),
+        actions=np.full(shape, 0, dtype=np.int16),
+        rewards=np.full(shape, 0.0, dtype=np.float32),
+        values=np.full(shape, 0.0, dtype=np.float32),
+        log_probs=np.full(shape, 0.0, dtype=np.float32),
+        next_values=np.full(shape, 0.0, dtype=np.float32),
+        ends=np.full(shape, False, dtype=np.bool_),
     )
 
 

@@ -48,6 +48,20 @@ CASES = {
     ("train", "population.islands.ppo64.size=-2"): "population.islands.ppo64.size must be >= 1",
     ("train", "population=fixed_policies", "population.islands.random.size=2"): "islands.random.size must be 1",
     ("train", "population=ppo6", "learner.network=[]"): "learner.network must be 1 to 6 widths",
+    ("train", "population=ppo6", "learner.n_steps=100"): "learner.n_steps must be a multiple of "
+    "learner.minibatch_size=64, such as 64 or 128, but is 100",
+    ("train", "population.islands.ppo96.learner.n_steps=50"): "islands.ppo96.learner.n_steps .* such as 64, but is 50",
+    (
+        "train",
+        "population=ppo6",
+        "learner=dqn",
+        "learner.gradient_steps=0",
+    ): "learner.gradient_steps must be >= 1, or -1",
+    ("train", "population=ppo6", "learner=dqn", "learner.buffer_size=900000000"): "main.learner.buffer_size must be <= "
+    r"\d+, but is 900000000: the run would need .* GiB of memory",
+    ("train", "population=ppo6", "learner.n_steps=640000000"): "main.learner.n_steps must be <= ",
+    ("train", "population=ppo6", "games_per_epoch=90000000"): "games_per_epoch must be <= ",
+    ("train", "population=ppo6", "population.islands.main.size=100000", "learner.network=[2048,2048]"): "too many m",
     ("train", "learner.network=[8]"): "learner.network has no effect with this population",
     ("train", "env=rps", "population=fixed_policies"): "policies.*env=rps.*rock",
     ("train", "env=rps", "population=ppo6", "optimizer=mapelites"): "optimizer.opponents.*rock",

@@ -106,7 +106,7 @@ def test_the_same_seed_gives_the_same_bytes_whatever_the_workers(berteam, tmp_pa
 @pytest.mark.parametrize("selector", ["berteam", "mcaa"])
 def test_a_resumed_run_ends_with_the_same_bytes(selector, berteam, tmp_path):
     words = [*selector_words(selector), "population=islands4x3", *TINY, "optimizer.protect_new=1"]
-    words += [f"population.islands.{name}.learner.n_steps=50" for name in ("ppo64", "ppo96")]
+    words += [f"population.islands.{name}.learner.n_steps=64" for name in ("ppo64", "ppo96")]
     berteam("train", *words, "out=whole", "epochs=6")
     berteam("train", *words, "out=parts", "epochs=3")
     berteam("resume", "parts", "epochs=6", "workers=1")

@@ -1,0 +1,65 @@
+import resource
+
+import numpy as np
+import pytest
+
+from berteam_cli import build, memory
+from berteam_cli.acting import fixed_policies
+from berteam_cli.config import checked
+from berteam_cli.env.base import blank_trajectories, trajectory_bytes
+from berteam_cli.errors import InputError
+from berteam_cli.games import pairings
+from tests.makers import mctf
+from tests.test_config import composed
+
+
+@pytest.mark.parametrize("learner", ["ppo", "dqn"])
+def test_what_is_told_is_what_is_taken(learner):
+    parts = build.parts(checked(composed("population=ppo6", f"learner={learner}", "learner.network=[20,7]")))
+    (island,) = parts.optimizer.islands
+    state = island.learner.init(6, np.random.default_rng(0))
+    taken = sum(x.numel() * x.element_size() for x in island.learner.tensors(state).values())
+    assert island.learner.state_bytes(6) == taken
+    assert trajectory_bytes(parts.games.env, 16) == sum(x.nbytes for x in parts.room)
+
+
+def test_the_trajectories_of_an_epoch_go_where_those_of_the_last_one_went():
+    games = mctf(max_time_s=20.0)
+    room = blank_trajectories(games.env, 2)
+    lineups = pairings(np.zeros((2, 2), int), np.ones((2, 2), int))
+    _, first = games.play(fixed_policies(range(7)), lineups, 0, record=True, room=room)
+    _, second = games.play(fixed_policies(range(7)), lineups, 1, record=True, room=room)
+    assert np.shares_memory(first.observations, second.observations)
+    assert first.observations is room.observations
+
+
+def limited(monkeypatch, learner, setting, limit):
+    monkeypatch.setattr(memory, "available", lambda: limit)
+    words = ["population=ppo6", f"learner={learner}", setting]
+    return build.parts(checked(composed(*words)))
+
+
+@pytest.mark.parametrize(("learner", "key", "step"), [("dqn", "buffer_size", 1), ("ppo", "n_steps", 64)])
+def test_the_largest_buffer_that_is_said_to_fit_does(learner, key, step, monkeypatch):
+    limit = 300 * 2**20
+    with pytest.raises(InputError) as refused:
+        limited(monkeypatch, learner, f"learner.{key}=64000000", limit)
+    fits = int(str(refused.value).split("<= ")[1].split(",")[0]) // step * step
+    limited(monkeypatch, learner, f"learner.{key}={fits}", limit)
+    with pytest.raises(InputError):
+        limited(monkeypatch, learner, f"learner.{key}={fits + step}", limit)
+
+
+def test_what_a_process_is_limited_to_counts():
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    whole = memory.available()
+    assert whole > 2**28
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (whole // 2, hard))
+        assert memory.available() == whole // 2
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def test_sizes_are_read_with_ease():
+    assert [memory.spoken(x) for x in (310 * 2**20, 2.5 * 2**30, 3000 * 2**30)] == ["310 MiB", "2.5 GiB", "3,000.0 GiB"]
