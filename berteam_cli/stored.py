@@ -16,6 +16,8 @@ from berteam_cli.folder import CONFIG
 
 MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
+ADDED = {"population.members": []}
+"""Keys that came with a later version, and what they are where a run of an earlier one goes on."""
 PLACE = ("out", "on_exists")
 """Keys that say where a run goes, not what it does."""
 
@@ -65,6 +67,11 @@ def stored_config(folder: Path) -> DictConfig:
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
 
 
+def goes_on(config: TrainConfig, folder: Path | None) -> bool:
+    """Returns whether ``config`` goes on with a run in ``folder``, None for one that is not known yet."""
+    return config.on_exists == "resume" and folder is not None and (folder / CONFIG).exists()
+
+
 def check_same(folder: Path, text: str) -> None:
     """Checks that the config ``text`` can go on with the run in ``folder``.
 
@@ -72,6 +79,7 @@ def check_same(folder: Path, text: str) -> None:
         InputError: a key that may not change has another value.
     """
     old, new = flat(OmegaConf.to_container(plain_config(folder))), flat(OmegaConf.to_container(OmegaConf.create(text)))
+    old = ADDED | old
     for key in sorted(old.keys() | new.keys()):
         if key.split(".", maxsplit=1)[0] not in MAY_CHANGE + PLACE and old.get(key) != new.get(key):
             raise InputError(

@@ -125,7 +125,7 @@ def of_run(config: ReplayConfig, folder: Path) -> Match:
         RunError: it has no checkpoint.
     """
     read_manifest(folder)
-    parts = build.parts(checked(stored_config(folder)))
+    parts = build.parts(checked(stored_config(folder)), stored=True)
     game = filmable(parts.games.env)
     run = checkpoint.load(folder, parts).run
     population, islands = run.population, parts.optimizer.islands
