@@ -6,12 +6,22 @@ import os
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import torch
 
-from berteam_cli.config import CommandConfig, EnvConfig, IslandConfig, LearnerConfig, OptimizerConfig, TrainConfig
+from berteam_cli.acting import Policies, joined
+from berteam_cli.config import (
+    CommandConfig,
+    EnvConfig,
+    IslandConfig,
+    LearnerConfig,
+    MemberConfig,
+    OptimizerConfig,
+    TrainConfig,
+)
 from berteam_cli.env.base import Env, blank_trajectories
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.pettingzoo import Pettingzoo
@@ -21,9 +31,11 @@ from berteam_cli.games import Games
 from berteam_cli.learner.base import Learner
 from berteam_cli.learner.dqn import Dqn
 from berteam_cli.learner.fixed import Fixed as FixedLearner
+from berteam_cli.learner.imported import Imported, read
 from berteam_cli.learner.ppo import Ppo
 from berteam_cli.learner.stacked_dqn import StackedDqn
 from berteam_cli.learner.stacked_ppo import StackedPpo
+from berteam_cli.learner.zipped import Unfit
 from berteam_cli.memory import check_memory
 from berteam_cli.optimizer.aggression import opponents
 from berteam_cli.optimizer.base import Optimizer
@@ -41,6 +53,7 @@ from berteam_cli.workers import Workers, available_cores
 
 ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps, "pettingzoo": Pettingzoo}
 SELECTORS: dict[str, Callable[..., Selector[Any]]] = {"uniform": Uniform, "mcaa": Mcaa, "berteam": Berteam}
+MEMBERS = "members"  # the island of members from files
 NO_NAMES = {"na", "nan", "null", "none", "n-a", "other"}  # pandas reads most of these as nothing
 
 LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": Ppo, "dqn": Dqn}
@@ -67,15 +80,19 @@ def env(config: EnvConfig, team_size: int) -> Env:
         raise InputError(f"env.{error}") from error
 
 
-def parts(config: TrainConfig) -> Parts:
+def parts(config: TrainConfig, *, stored: bool = False) -> Parts:
     """Returns everything a run is made of.
+
+    Args:
+        config: checked.
+        stored: whether the run has a checkpoint, which holds the members from files too: the files may be gone.
 
     Raises:
         InputError: parts of the config do not go together.
     """
     playing = games(config)
     device = chosen_device(config.device)
-    islands = archipelago(config, playing.env, device)
+    islands = archipelago(config, playing.env, device, stored=stored)
     members = sum(island.size for island in islands)
     if config.team_size > members:
         raise InputError(
@@ -95,6 +112,11 @@ def parts(config: TrainConfig) -> Parts:
     )
 
 
+def parts_to_read(config: TrainConfig) -> Parts:
+    """Returns the parts of a run that is only looked at: on the processor, wherever its members learnt."""
+    return parts(replace(config, device="cpu"), stored=True)
+
+
 def chosen_device(name: str) -> str:
     """Returns "cpu" or "cuda".
 
@@ -107,11 +129,11 @@ def chosen_device(name: str) -> str:
     return "cuda" if there and name != "cpu" else "cpu"
 
 
-def archipelago(config: TrainConfig, game: Env, device: str) -> tuple[Island, ...]:
-    """Returns the islands of the population, one after the other.
+def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) -> tuple[Island, ...]:
+    """Returns the islands of the population, one after the other, that of members from files last.
 
     Raises:
-        InputError: there is none, or its learner does not fit.
+        InputError: there is none, or its learner or a file does not fit.
     """
     islands: list[Island] = []
     for name, settings in config.population.islands.items():
@@ -125,9 +147,44 @@ def archipelago(config: TrainConfig, game: Env, device: str) -> tuple[Island, ..
             typed = len(config.population.islands) == 1 and settings.learner == config.learner
             made = learner(settings.learner, game, "learner" if typed else f"{key}.learner", device)
         islands.append(Island(name, first, settings.size, made))
+    if members := config.population.members:
+        if MEMBERS in config.population.islands:
+            raise InputError(
+                f"population.islands.{MEMBERS} must have another name: "
+                f"the members of population.members are on the island {MEMBERS}."
+            )
+        first = islands[-1].first + islands[-1].size if islands else 0
+        islands.append(Island(MEMBERS, first, len(members), imported_members(members, game, stored=stored)))
     if not islands:
-        raise InputError("population.islands must have at least one island, but has none.")
+        raise InputError(
+            "population must have members, but has none: name islands in population.islands, "
+            "or files in population.members=[{file: agent.zip}]."
+        )
     return tuple(islands)
+
+
+def imported_members(members: list[MemberConfig], game: Env, *, stored: bool) -> Learner[Any]:
+    """Returns the learner of members from files, which are read unless the run is ``stored``.
+
+    Raises:
+        InputError: a file holds no policy that can act in this game, or a name is none or is another member's too.
+    """
+    called: list[str] = []
+    for k, member in enumerate(members):
+        name, key = member.name or Path(member.file).stem, f"population.members[{k}].name"
+        if not re.fullmatch(r"\w[\w.-]*", name, re.ASCII) or name.lower() in NO_NAMES:
+            raise InputError(f"{key} must be a word that tables can hold, but is {name!r}; give it another.")
+        if name in called:
+            raise InputError(f"{key} is {name!r}, as that of member {called.index(name)}; give each a name of its own.")
+        called.append(name)
+    size = game.observation_size, game.actions
+    tables: list[Policies] = []
+    for k, member in enumerate([] if stored else members):
+        try:
+            tables.append(read(Path(member.file), *size, trust=member.trust))
+        except Unfit as error:
+            raise InputError(f"population.members[{k}].file={member.file} {error}.") from error
+    return Imported(tuple(called), *size, None if stored else joined(tables))
 
 
 def fixed_members(settings: IslandConfig, game: Env, key: str) -> Learner[Any]:

@@ -25,6 +25,7 @@ WORDS = {
     "resume": "goes on with a run from its last checkpoint",
     "tournament": "every team against every other",
     "replay": "one game as a page for the browser or as a GIF",
+    "export": "a member as a file that Stable-Baselines3 loads",
     "inspect": "the tables of a run in the terminal",
     "list": "what can be chosen",
 }
@@ -69,7 +70,7 @@ def run(word: str, words: list[str]) -> None:
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
     commands = {"train": composed, "tournament": composed, "replay": replay}
-    commands |= {"resume": resume, "inspect": inspect, "list": listing}
+    commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing}
     commands[word](word, words)
 
 
@@ -103,7 +104,9 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
     from berteam_cli import build  # noqa: PLC0415
 
     if word == "train":
-        build.parts(config)
+        from berteam_cli.stored import goes_on  # noqa: PLC0415
+
+        build.parts(config, stored=goes_on(config, Path(config.out) if config.out else None))
     elif word == "tournament":
         from berteam_cli.command import tournament  # noqa: PLC0415
 
@@ -217,6 +220,19 @@ def replay(word: str, words: list[str]) -> None:
     if {"-m", "--multirun"} & set(words):
         raise InputError("replay films one game, so it takes no --multirun.")
     composed(word, words)
+
+
+def export(word: str, words: list[str]) -> None:
+    """Writes a member of a run as a file of Stable-Baselines3."""
+    given = reader(
+        word,
+        words,
+        run={"type": Path, "help": "folder of the run"},
+        overrides={"nargs": "*", "help": "agent=N, out=FILE.zip (RUN/agent_N.zip), on_exists=error or overwrite"},
+    )
+    from berteam_cli.command.export import export as write_member  # noqa: PLC0415
+
+    write_member(given.run, given.overrides)
 
 
 def inspect(word: str, words: list[str]) -> None:

@@ -132,6 +132,8 @@ def check_learner(config: DictConfig, overrides: list[Override]) -> None:
     said = [x.key_or_group for x in overrides if x.key_or_group.split(".")[0] == "learner" and "@" not in x.input_line]
     islands = config.get("population", {}).get("islands", {})
     if said and not any(OmegaConf.is_interpolation(island, "learner") for island in islands.values()):
+        if not islands:
+            raise InputError(f"{said[0]} has no effect with this population, which has no islands that learn.")
         name = next(iter(islands))
         raise InputError(
             f"{said[0]} has no effect with this population, whose islands bring learners of their own; "

@@ -272,10 +272,26 @@ class IslandConfig:
 
 
 @dataclass
+class MemberConfig:
+    """A member that acts by the network in a file of Stable-Baselines3; learner/imported.py.
+
+    Attributes:
+        file: path of the zip file.
+        name: of the member; None: the file's name without its ending.
+        trust: whether code in the file may run, where its plain part does not tell how the policy acts.
+    """
+
+    file: str = MISSING
+    name: str | None = None
+    trust: bool = False
+
+
+@dataclass
 class PopulationConfig:
-    """The islands by name."""
+    """The islands by name, and members from files, who make one more."""
 
     islands: dict[str, IslandConfig] = MISSING
+    members: list[MemberConfig] = field(default_factory=list)
 
 
 @dataclass

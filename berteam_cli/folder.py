@@ -9,7 +9,7 @@ import platform
 import shutil
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -56,6 +56,24 @@ def claim(folder: Path, on_exists: str) -> None:
             if path.is_dir():
                 path.rmdir()
         raise InputError(f"out={folder} cannot be written: {error.strerror or error}.") from error
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Makes ``path`` with ``write``; there is never half of it.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    part = path.with_name(f"{path.name}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            write(part)
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
 
 
 def missing(folder: Path) -> list[Path]:

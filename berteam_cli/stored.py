@@ -65,6 +65,11 @@ def stored_config(folder: Path) -> DictConfig:
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
 
 
+def goes_on(config: TrainConfig, folder: Path | None) -> bool:
+    """Returns whether ``config`` goes on with a run in ``folder``, None for one that is not known yet."""
+    return config.on_exists == "resume" and folder is not None and (folder / CONFIG).exists()
+
+
 def check_same(folder: Path, text: str) -> None:
     """Checks that the config ``text`` can go on with the run in ``folder``.
 

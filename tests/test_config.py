@@ -4,14 +4,17 @@ import re
 from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
+from gymnasium.spaces import Box
 from hydra import compose, initialize_config_module
 
 from berteam_cli import build
 from berteam_cli.compose import CONF, choices, groups, keys, prepare
 from berteam_cli.config import checked
 from berteam_cli.errors import InputError
+from berteam_cli.learner.exporting import exported
 
 ROOT = Path(__file__).parent.parent
 YAMLS = sorted((ROOT / "conf").glob("**/*.yaml"))
@@ -31,14 +34,26 @@ def all_choices():
         return [(group, choice) for group in groups() for choice in choices(group)]
 
 
+@pytest.fixture(scope="module")
+def a_file(tmp_path_factory):
+    """A member of the default game, as a file of Stable-Baselines3."""
+    path, parts = tmp_path_factory.mktemp("member") / "one.zip", build.parts(checked(composed("population=ppo6")))
+    learner, game = parts.optimizer.islands[0].learner, parts.games.env
+    state = learner.init(1, np.random.default_rng(0))
+    exported(learner, state, 0, Box(-1, 1, (game.observation_size,), np.float32)).save(path)
+    return path
+
+
 @pytest.mark.parametrize(("group", "choice"), all_choices())
-def test_every_choice_builds(group, choice):
+def test_every_choice_builds(group, choice, a_file):
     if (group, choice) == ("learner", "fixed"):
         overrides = ["population=ppo6", "learner=fixed", "learner.policies=[random,random,random,random,random,random]"]
     else:
         overrides = [f"{group}={choice}", *NEEDS.get(choice, [])]
     if choice == "rps":
         overrides += ["population=ppo6"]
+    if choice == "imported":
+        overrides += [f"population.members=[{{file: {a_file}}},{{file: {a_file}, name: twin}}]"]
     parts = build.parts(checked(composed(*overrides)))
     assert parts.selector.field.members == sum(island.size for island in parts.optimizer.islands)
 

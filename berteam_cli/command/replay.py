@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from berteam_cli.command.inspect import read_table
 from berteam_cli.config import ReplayConfig, checked
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError, RunError
-from berteam_cli.folder import new_folder, read_manifest
+from berteam_cli.folder import new_folder, read_manifest, write_whole
 from berteam_cli.games import Games, pairings
 from berteam_cli.outcomes import Experience, Ints, Outcomes
 from berteam_cli.population import names, policies
@@ -126,7 +125,7 @@ def of_run(config: ReplayConfig, folder: Path) -> Match:
         RunError: it has no checkpoint.
     """
     read_manifest(folder)
-    parts = build.parts(checked(stored_config(folder)))
+    parts = build.parts_to_read(checked(stored_config(folder)))
     game = filmable(parts.games.env)
     run = checkpoint.load(folder, parts).run
     population, islands = run.population, parts.optimizer.islands
@@ -284,21 +283,3 @@ def ending(film: Film) -> str:
     result = "It is a draw" if blue == red else f"{'Blue' if blue > red else 'Red'} wins"
     result = {BLUE_WON: "Blue wins", RED_WON: "Red wins", TIED: "It is a draw"}.get(film.end, result)
     return f"{result}, {blue} to {red}, after {clock(film.time[-1])} ({len(film.time) - 1} steps)."
-
-
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Makes ``path`` with ``write``; there is never half of it.
-
-    Raises:
-        InputError: it cannot be written.
-    """
-    part = path.with_name(f"{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            write(part)
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error

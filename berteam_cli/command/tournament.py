@@ -161,7 +161,7 @@ def of_run(config: TournamentConfig) -> Entry:
         raise InputError(f"out must be another folder than run, but both are {config.out}.")
     trained = checked(stored_config(folder))
     trained.workers = config.workers
-    parts = build.parts(trained)
+    parts = build.parts_to_read(trained)
     run = checkpoint.load(folder, parts).run
     acting = policies(parts.optimizer.islands, run.population, explore=False)
     found = measured(parts.selector, run.selection, SAMPLES, generator(parts.seed, RECORDS, run.epoch))

@@ -12,13 +12,13 @@ from berteam_cli.command.inspect import show
 from berteam_cli.config import TrainConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
-from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
+from berteam_cli.folder import Manifest, claim, logging_to, new_folder
 from berteam_cli.memory import needed, spoken
 from berteam_cli.pace import Pace
 from berteam_cli.recording import Recorder
 from berteam_cli.records import Tables
 from berteam_cli.stopping import Stop, stoppable
-from berteam_cli.stored import check_same, write_config
+from berteam_cli.stored import check_same, goes_on, write_config
 from berteam_cli.training import Parts, Run, begin, epoch
 
 log = logging.getLogger("berteam")
@@ -38,8 +38,8 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
         KeyboardInterrupt: it was interrupted; its state is saved.
     """
     started = time.monotonic()
-    parts = build.parts(config)
     folder = folder or new_folder("train")
+    parts = build.parts(config, stored=goes_on(config, folder))
     saved = resumed(config, text, folder, parts)
     if saved is None:
         claim(folder, config.on_exists)
@@ -68,7 +68,7 @@ def resumed(config: TrainConfig, text: str, folder: Path, parts: Parts) -> Saved
         InputError: the folder's run was made with other settings, or is further than the config wants it.
         RunError: it has no whole checkpoint.
     """
-    if config.on_exists != "resume" or not (folder / CONFIG).exists():
+    if not goes_on(config, folder):
         return None
     check_same(folder, text)
     saved = checkpoint.load(folder, parts)
