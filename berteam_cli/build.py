@@ -40,7 +40,15 @@ ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps, "pettingzoo": P
 SELECTORS: dict[str, Callable[..., Selector[Any]]] = {"uniform": Uniform, "mcaa": Mcaa, "berteam": Berteam}
 NO_NAMES = {"na", "nan", "null", "none", "n-a", "other"}  # pandas reads most of these as nothing
 
-LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": Ppo, "dqn": Dqn}
+
+def sb3(**settings: Any) -> Learner[Any]:
+    """Returns a learner of Stable-Baselines3, which is loaded only for it, as that takes seconds."""
+    from berteam_cli.learner.sb3 import Sb3  # noqa: PLC0415
+
+    return Sb3(**settings)
+
+
+LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": Ppo, "dqn": Dqn, "sb3": sb3}
 
 
 def games(config: CommandConfig) -> Games:
@@ -151,19 +159,22 @@ def learner(config: LearnerConfig, game: Env, key: str) -> Learner[Any]:
     """Returns a learner of networks.
 
     Raises:
-        InputError: its network is not one.
+        InputError: its network is not one, or another setting is not allowed.
     """
     settings = asdict(config)
     name = settings.pop("name")
     network = settings.pop("network")
     if not 1 <= len(network) <= 6 or not all(1 <= width <= 4096 for width in network):
         raise InputError(f"{key}.learner.network must be 1 to 6 widths from 1 to 4096, but is {network}.")
-    return LEARNERS[name](
-        observation_size=game.observation_size,
-        actions=game.actions,
-        network=tuple(network),
-        **settings,
-    )
+    try:
+        return LEARNERS[name](
+            observation_size=game.observation_size,
+            actions=game.actions,
+            network=tuple(network),
+            **settings,
+        )
+    except ValueError as error:
+        raise InputError(f"{key}.learner.{error}") from error
 
 
 def selector(config: TrainConfig, field: Field, device: str) -> Selector[Any]:
