@@ -3,7 +3,7 @@
 training.py      the loop of the paper's Algorithm 1
 selector/        who plays together: uniform, mcaa, berteam
 optimizer/       who stays in the population: coevolution, mapelites, fixed
-learner/         how a member learns from its own steps: ppo, dqn, fixed
+learner/         how a member learns from its own steps: ppo, dqn, sb3, fixed
 env/             the games: mctf, rps
 rating/          Elo
 evaluation/      tournaments and the true strength of teams

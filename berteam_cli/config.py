@@ -264,6 +264,17 @@ class DqnConfig(LearnerConfig):
 
 
 @dataclass
+class Sb3Config(LearnerConfig):
+    """Settings of learner/sb3.py."""
+
+    algorithm: str = MISSING
+    network: list[int] = MISSING
+    activation: str | None = choice("tanh", "relu")
+    schedule_steps: int = number(1)
+    options: dict[str, Any] = field(default_factory=open_dict)
+
+
+@dataclass
 class IslandConfig:
     """One island of the population."""
 
@@ -361,7 +372,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
     "env": {"mctf": MctfConfig, "rps": RpsConfig, "pettingzoo": PettingzooConfig},
     "selector": {"uniform": UniformConfig, "mcaa": McaaConfig, "berteam": BerteamConfig},
     "optimizer": {"fixed": FixedOptimizerConfig, "coevolution": CoevolutionConfig, "mapelites": MapElitesConfig},
-    "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig},
+    "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig, "sb3": Sb3Config},
     "population": {"islands": PopulationConfig},
     "evaluation": {"truth": EvaluationConfig},
     "command": {"train": TrainConfig, "tournament": TournamentConfig, "replay": ReplayConfig},

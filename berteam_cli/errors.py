@@ -26,5 +26,6 @@ class RunError(Exception):
 
 def did_you_mean(given: str, allowed: Iterable[str]) -> str:
     """Returns " Did you mean x?" with the word of ``allowed`` nearest to ``given``, or nothing if none is near."""
-    near = get_close_matches(str(given).lower(), list(allowed), n=1, cutoff=0.5)
-    return f" Did you mean {near[0]}?" if near else ""
+    words = {word.lower(): word for word in allowed}
+    near = get_close_matches(str(given).lower(), list(words), n=1, cutoff=0.5)
+    return f" Did you mean {words[near[0]]}?" if near else ""

@@ -55,13 +55,14 @@ def check_memory(islands: tuple[Island, ...], env: Env, games: int) -> None:
     said = f"the run would need {spoken(total)} of memory, and there are {spoken(limit)}"
     largest = max(islands, key=lambda island: island.learner.state_bytes(island.size))
     takes = largest.learner.state_bytes(largest.size)
-    if played > takes or not largest.learner.buffer:
+    if played > takes:
         fits = (limit - members) * games // played
         raise InputError(f"games_per_epoch must be <= {max(fits, 0)}, but is {games}: {said}.")
-    key, learner = largest.learner.buffer, largest.learner
-    one, two = (replace(learner, **{key: size}).state_bytes(largest.size) for size in (1, 2))
-    fits = 1 + (limit - (total - takes) - one) // (two - one)
-    name = f"population.islands.{largest.name}.learner.{key}"
+    key, learner, fits = largest.learner.buffer, largest.learner, 0
+    if key:
+        one, two = (replace(learner, **{key: size}).state_bytes(largest.size) for size in (1, 2))
+        fits = 1 + (limit - (total - takes) - one) // (two - one)
+    name = f"population.islands.{largest.name}"
     if fits < 1:
-        raise InputError(f"population.islands.{largest.name}.size is {largest.size}, too many members: {said}.")
-    raise InputError(f"{name} must be <= {fits}, but is {getattr(learner, key)}: {said}.")
+        raise InputError(f"{name}.size is {largest.size}, too many members of {spoken(takes)} together: {said}.")
+    raise InputError(f"{name}.learner.{key} must be <= {fits}, but is {getattr(learner, key)}: {said}.")

@@ -112,5 +112,5 @@ def observation_space(game: Env) -> Box:
 def loading(kind: type, path: Path) -> str:
     """Returns a line of Python that loads the model in ``path``; a DQN explores unless it is told not to."""
     package, name = kind.__module__.partition(".")[0], kind.__name__
-    sure = ", deterministic=True" if name == "DQN" else ""
+    sure = ", deterministic=True" if name.endswith("DQN") else ""
     return f"from {package} import {name}; model = {name}.load({str(path)!r}); model.predict(observation{sure})"

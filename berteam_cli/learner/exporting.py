@@ -117,7 +117,13 @@ def policy_settings(learner: Ppo | Dqn) -> dict[str, Any]:
     return {"net_arch": list(learner.network), "activation_fn": activation}
 
 
+def own_model(learner: Learner[Any], state: list[BaseAlgorithm], row: int, space: Box) -> BaseAlgorithm:
+    """Returns the model that a member of ``sb3`` is."""
+    return state[row]
+
+
 EXPORTERS: dict[str, Callable[[Any, Any, int, Box], BaseAlgorithm]] = {"ppo": ppo, "dqn": dqn}
+EXPORTERS |= dict.fromkeys(("A2C", "DQN", "PPO", "QRDQN", "TRPO"), own_model)
 """By ``Learner.algorithm``: what makes a model of a member, called as ``exported`` is."""
 
 

@@ -4,6 +4,8 @@ import re
 
 import pytest
 
+SB3 = ("train", "population=ppo6", "learner=sb3")
+
 CASES = {
     ("trian",): "'trian' is no command.*Did you mean train",
     ("train", "selector=mcca"): "selector must be one of berteam, mcaa, uniform, but is 'mcca'.*Did you mean mcaa",
@@ -63,6 +65,22 @@ CASES = {
     ("train", "population=ppo6", "games_per_epoch=90000000"): "games_per_epoch must be <= ",
     ("train", "population=ppo6", "population.islands.main.size=100000", "learner.network=[2048,2048]"): "too many m",
     ("train", "learner.network=[8]"): "learner.network has no effect with this population",
+    (*SB3, "learner.algorithm=a2d"): r"learner.algorithm must be one of A2C, .*, but is 'a2d'. Did you mean A2C\?",
+    (*SB3, "learner.algorithm=TD3"): "learner.algorithm cannot be TD3: its actions are continuous",
+    (*SB3, "learner.algorithm=RecurrentPPO"): "learner.algorithm cannot be RecurrentPPO: its networks remember",
+    (*SB3, "learner.options.n_step=8"): r"learner.options.n_step is no option of A2C. Did you mean n_steps\?",
+    (*SB3, "learner.options.seed=8"): "learner.options.seed cannot be set: .* seed of the run",
+    (*SB3, "learner.options.gamma=2"): "learner.options.gamma must be >= 0 and <= 1, but is 2",
+    (*SB3, "learner.options=8"): "learner.options must be keywords with values",
+    (
+        *SB3,
+        "learner.algorithm=PPO",
+        "learner.options.n_steps=100",
+    ): "learner.options.n_steps must be a multiple of .*=50",
+    (*SB3, "learner.algorithm=PPO", "learner.options.batch_size=1"): "learner.options cannot be used, as PPO says",
+    (*SB3, "learner.algorithm=DQN", "learner.options.train_freq=[1,episode]"): "train_freq must be a whole number",
+    (*SB3, "learner.activation=elu"): "learner.activation must be one of relu, tanh, but is 'elu'",
+    ("train", "-m", "learner=sb3", "population=ppo6", "learner.algorithm=A2C,SAC"): "learner.algorithm cannot be SAC",
     ("train", "env=rps", "population=fixed_policies"): "policies.*env=rps.*rock",
     ("train", "env=rps", "population=ppo6", "optimizer=mapelites"): "optimizer.opponents.*rock",
     ("train", "selector=mcaa", "optimizer.fitness=elo"): "selector=mcaa has none",
