@@ -108,7 +108,8 @@ def read(place: Path, parts: Parts) -> Saved:
         raise ValueError(f"its schema is {said['schema']}, this version reads {SCHEMA}")
     if digest(place / "tensors.safetensors") != said["sha256"]:
         raise ValueError("its checksum is wrong")
-    tensors = load_file(place / "tensors.safetensors")
+    # In memory of their own: by where a tensor lies torch chooses its kernels, and so the last bits of what comes out.
+    tensors = {name: tensor.clone() for name, tensor in load_file(place / "tensors.safetensors").items()}
     minds = tuple(
         island.learner.restored(below(tensors, f"island.{i}.")) for i, island in enumerate(parts.optimizer.islands)
     )

@@ -25,6 +25,7 @@ RPS = ["env=rps", "selector=uniform", "epochs=4", "games_per_epoch=8", "record_e
 TAUGHT = [
     *("population=islands4x3", "optimizer.protect_new=0"),
     *(f"population.islands.{island}.learner.n_steps=4" for island in ("ppo64", "ppo96")),
+    *(f"population.islands.{island}.learner.minibatch_size=4" for island in ("ppo64", "ppo96")),
     *(f"population.islands.{island}.learner.learning_starts=2" for island in ("dqn64", "dqn96")),
 ]
 UNTIMED = ("agents", "captain_distribution", "games", "generations", "island_distribution", "learning")
@@ -48,7 +49,7 @@ def run(berteam):
 
 def test_members_act_the_same_when_loaded(run, berteam, tmp_path):
     ours = members_of(tmp_path / "run")
-    work, seen = np.zeros((2, ours.sizes.max()), dtype=np.float32), np.ones(1, dtype=np.float32)
+    work, seen = np.zeros(2 * ours.sizes.max(), dtype=np.float32), np.ones(1, dtype=np.float32)
     for agent in (1, 4):
         said = berteam("export", "run", f"agent={agent}").stdout.splitlines()
         assert said[-1] == f"run/agent_{agent}.zip"
@@ -127,6 +128,7 @@ def test_beside_others_they_are_cloned_and_go_on_after_their_files_are_gone(run,
         *RPS,
         "population=ppo6",
         "learner.n_steps=4",
+        "learner.minibatch_size=4",
         "optimizer.protect_new=0",
         "optimizer.elites=1",
         files(*names),
@@ -144,15 +146,6 @@ def test_beside_others_they_are_cloned_and_go_on_after_their_files_are_gone(run,
     assert len(set(agents.name)) < 3
     berteam("train", *words, "out=parts", "on_exists=resume", "epochs=8")
     assert "population.members is" in berteam(*("train", *words[:-1], "out=parts", "on_exists=resume"), code=2).stderr
-
-
-def test_a_run_of_before_there_were_members_goes_on(run, berteam, tmp_path):
-    config = tmp_path / "run" / "config.yaml"
-    text = config.read_text()
-    assert "  members: []\n" in text
-    config.write_text(text.replace("  members: []\n", ""))
-    berteam("resume", "run", "epochs=5")
-    assert pd.read_csv(tmp_path / "run" / "games.csv").epoch.max() == 5
 
 
 EXPORTS = {

@@ -62,9 +62,9 @@ def test_ppo_has_the_same_chances_of_actions_and_the_same_values(loaded, random_
     with torch.no_grad():
         chances = model.policy.get_distribution(torch.from_numpy(seen)).distribution.probs
         values = model.policy.predict_values(torch.from_numpy(seen))
-    logits = torch.from_numpy(outputs(weights[:cut], ppo.policy_sizes, seen).copy())
+    logits = torch.from_numpy(outputs(weights[:cut], ppo.policy_sizes, ppo.smooth, seen).copy())
     np.testing.assert_allclose(chances, logits.softmax(dim=1), atol=1e-6)
-    np.testing.assert_allclose(values, outputs(weights[cut:], ppo.value_sizes, seen), atol=1e-5)
+    np.testing.assert_allclose(values, outputs(weights[cut:], ppo.value_sizes, ppo.smooth, seen), atol=1e-5)
     assert (model.observation_space, model.action_space) == (SPACE, Discrete(ACTIONS))
 
 
@@ -98,7 +98,7 @@ def test_dqn_takes_the_same_greedy_actions(loaded, random_games):
     dqn, state = taught_dqn(random_games([[0, 1, 2, 9]], [100], [True]))
     model, seen = loaded(DQN, dqn, state), observations()
     policies = dqn.policies(state, explore=False)
-    work = np.zeros((2, policies.sizes.max()), dtype=np.float32)
+    work = np.zeros(2 * policies.sizes.max(), dtype=np.float32)
     ours = [act(policies, ROW, each, work, 0.5, 0.5) for each in seen]
     theirs, _ = model.predict(seen, deterministic=True)
     assert list(theirs) == ours
@@ -157,5 +157,7 @@ def test_the_model_is_apart_from_the_member(random_games):
 
 def test_fixed_policies_have_no_network():
     fixed = Fixed(indices=(0, 1), policies_by_name=("a", "b"))
-    with pytest.raises(ValueError, match="its learner is fixed, and only members of ppo, dqn can be"):
+    with pytest.raises(
+        ValueError, match="its learner is fixed, and only members of ppo, dqn, A2C, DQN, PPO, QRDQN, TRPO can be"
+    ):
         exported(fixed, fixed.init(2, np.random.default_rng(0)), 1, SPACE)

@@ -35,7 +35,7 @@ def saved(sb3_model, tmp_path):
 
 def chances(policies, k, observation, count=2000):
     """The shares of actions of policy ``k``, over evenly spaced choices."""
-    work = np.zeros((2, policies.sizes.max()), dtype=np.float32)
+    work = np.zeros(2 * policies.sizes.max(), dtype=np.float32)
     actions = [act(policies, k, observation, work, 0.99, (x + 0.5) / count) for x in range(count)]
     return np.bincount(actions, minlength=ACTIONS) / count
 

@@ -159,7 +159,18 @@ def test_valuers_learn_as_in_their_own_loop(algorithm, options, random_games, mo
 def test_ppo_is_the_learner_ppo(random_games, load, flat, monkeypatch):
     settings = {"n_steps": 60, "n_epochs": 3, "learning_rate": 1e-3, "gamma": 0.9, "gae_lambda": 0.8, "clip_range": 0.2}
     settings |= {"max_grad_norm": 0.5, "normalize_advantage": True}
-    own = Ppo(OBSERVATION, ACTIONS, (16, 12), minibatch_size=20, entropy_coef=0.01, value_coef=0.5, **settings)
+    own = Ppo(
+        OBSERVATION,
+        ACTIONS,
+        (16, 12),
+        "tanh",
+        clip_range_vf=None,
+        target_kl=None,
+        minibatch_size=20,
+        entropy_coef=0.01,
+        value_coef=0.5,
+        **settings,
+    )
     mind = own.init(1, np.random.default_rng(0))
     mind.trained.weights[:] += 0.2 * np.random.default_rng(1).standard_normal(mind.trained.weights.shape)
     sb3 = Sb3(OBSERVATION, ACTIONS, (16, 12), "PPO", None, 400, settings | {"batch_size": 20, "ent_coef": 0.01})
@@ -208,6 +219,9 @@ def test_dqn_is_the_learner_dqn(random_games, load, flat, monkeypatch):
         OBSERVATION,
         ACTIONS,
         (16, 12),
+        "relu",
+        n_steps=1,
+        tau=1.0,
         exploration_initial=1.0,
         exploration_final=0.1,
         exploration_steps=200,
@@ -252,7 +266,7 @@ def test_members_act_as_the_policy_of_stable_baselines(algorithm, activation):
     sb3 = learner(algorithm, activation)
     state = grown(sb3, 2)
     policies = sb3.policies(state, explore=False)
-    work = np.empty((2, policies.sizes.max()), dtype=np.float32)
+    work = np.empty(2 * policies.sizes.max(), dtype=np.float32)
     observations = np.random.default_rng(0).standard_normal((100, OBSERVATION), dtype=np.float32)
     assert policies.tanh.tolist() == [activation == "tanh" or (activation is None and algorithm in ACTORS)] * 2
     for k, model in enumerate(state):
@@ -412,7 +426,7 @@ def test_learns_which_action_is_rewarded(algorithm):
     observations = np.ones((1, 2, 201, OBSERVATION), dtype=np.float32)
     for epoch in range(8):
         policies = sb3.policies(state, explore=True)
-        work = np.empty((2, policies.sizes.max()), dtype=np.float32)
+        work = np.empty(2 * policies.sizes.max(), dtype=np.float32)
         draws = rng.random((2, 200, 2))
         done = [[act(policies, k, observations[0, 0, 0], work, *both) for both in draws[k]] for k in range(2)]
         actions = np.array([done], dtype=np.int16)

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from berteam_cli.learner.dqn import Dqn
 from berteam_cli.learner.ppo import Ppo
+from berteam_cli.learner.sb3 import Sb3
 from berteam_cli.optimizer.coevolution import Coevolution
 from berteam_cli.outcomes import Experience
 from berteam_cli.population import Island, founded
@@ -24,6 +26,16 @@ DQN = Dqn(
     learning_starts=0, target_update_interval=4, tau=1.0, exploration_initial=1.0, exploration_final=0.1,
     exploration_steps=100, max_grad_norm=10.0,
 )  # fmt: skip
+
+
+SB3 = [
+    Sb3(3, 2, (4,), algorithm, "tanh", 1000, options)
+    for algorithm, options in (
+        ("PPO", {"n_steps": 8, "batch_size": 4}),
+        ("A2C", {}),
+        ("DQN", {"buffer_size": 100, "learning_starts": 0}),
+    )
+]
 
 
 def optimizer_and_population(learner):
@@ -87,6 +99,21 @@ def test_the_parent_comes_before_the_fittest_unless_it_is_sick_too():
         people, _, _ = trained(optimizer, people, 1)
         people, _, replaced = trained(optimizer, people, 2)
         assert (1, expected) in [(x.removed, x.parent) for x in replaced]
+
+
+@pytest.mark.parametrize("learner", SB3, ids=[x.algorithm for x in SB3])
+def test_models_of_stable_baselines_are_watched_too(learner):
+    optimizer, people = optimizer_and_population(learner)
+    with torch.no_grad():
+        for weights in people.minds[0][1].policy.parameters():
+            weights.fill_(3e38)
+    for seed in (1, 2):
+        people, learnt, replaced = trained(optimizer, people, seed)
+        assert [learnt[row].failures for row in range(4)] == [0, 1, 0, 0]
+        assert [learnt[row].updates > 0 for row in range(4)] == [True, False, True, True]
+    assert [(x.removed, x.parent) for x in replaced] == [(1, 2)]
+    people, learnt, _ = trained(optimizer, people, 3)
+    assert learnt[1].updates > 0
 
 
 @pytest.mark.parametrize("learner", [PPO, DQN], ids=["ppo", "dqn"])
