@@ -1,90 +1,77 @@
-"""Speed of training: epochs, learners, selectors, and how soon a run starts."""
+"""Speed of training: whole runs by the real command, selectors, and how soon a run starts."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import torch
-from stable_baselines3 import PPO
+import pandas as pd
 
-from berteam_cli.outcomes import Experience
 from berteam_cli.training import begin, epoch
-from berteam_cli.workers import available_cores
 from tests.bench.timing import Row, parts, seconds
+
+BERTEAM = str(Path(sys.executable).with_name("berteam"))
+WARM = 6  # epochs before the rollouts of 2,048 steps are full for the first time, and kernels are loaded
+PARTS = ("select", "play", "learn", "probe", "renew", "selector", "record")
+TIMED = ["evaluation.games=0", "on_exists=overwrite"]
+
+
+def trained(folder: str, *words: str) -> tuple[pd.DataFrame, float]:
+    """Runs ``berteam train``; returns timing.csv after the warm-up, and the process's peak of memory in MiB."""
+    subprocess.run([BERTEAM, "train", *words, *TIMED, f"out={folder}"], stdout=subprocess.DEVNULL, check=True)
+    timing = pd.read_csv(f"{folder}/timing.csv").query(f"epoch > {WARM}")
+    return timing, float(pd.read_csv(f"{folder}/summary.csv").peak_rss_mib[0])
+
+
+def total(timing: pd.DataFrame) -> float:
+    return float(timing[[f"{part}_s" for part in PARTS]].sum(axis=1).mean())
 
 
 def epoch_rows() -> Iterator[Row]:
-    for name, overrides, target in (
-        ("paper_coevolution", ["experiment=paper_coevolution"], "(goal 1.0)"),
-        ("paper_comparison, coevolution", ["experiment=paper_comparison"], "15 (goal 0.7)"),
-        (
-            "paper_comparison, MAP-Elites projecting every epoch",
-            ["experiment=paper_comparison", "optimizer=mapelites", "optimizer.protect_new=1"],
-            "(goal 1.0)",
-        ),
-    ):
-        made = parts(*overrides)
-        run, split, count = begin(made), {}, 0
-        for _ in range(16):  # rollouts of 2,048 steps are full for the first time after some 3 to 5 epochs
-            run, report = epoch(run, made)
-            if run.epoch > 6:
-                count += 1
-                for part, taken in report.seconds.items():
-                    split[part] = split.get(part, 0.0) + taken
-        parts_of = ", ".join(f"{part[:-2]} {total / count:.2f}" for part, total in split.items())
-        yield f"epoch of {name}, s ({parts_of})", f"{sum(split.values()) / count:.2f}", target
+    """Epochs of the paper's experiments, in the mean of 20 with two selector updates among them."""
+    mapelites = ["experiment=paper_comparison", "optimizer=mapelites", "optimizer.protect_new=1"]
+    many = ["experiment=paper_coevolution", "population.islands.main.size=500", "games_per_epoch=250"]
+    with tempfile.TemporaryDirectory() as folder:
+        for name, words, target in (
+            ("paper_coevolution", ["experiment=paper_coevolution"], "1.0"),
+            ("paper_comparison", ["experiment=paper_comparison"], "0.7"),
+            ("paper_comparison with MAP-Elites projecting in every epoch", mapelites, "1.0"),
+        ):
+            timing, memory = trained(f"{folder}/run", *words, f"epochs={WARM + 20}")
+            split = ", ".join(f"{part} {timing[f'{part}_s'].mean():.3f}" for part in PARTS)
+            yield f"epoch of {name}, s ({split})", f"{total(timing):.2f}", target
+            if name == "paper_coevolution":
+                fifty = total(timing)
+                yield "  its memory, MiB", f"{memory:.0f}", "1,536"
+        timing, memory = trained(f"{folder}/run", *many, f"epochs={WARM + 10}", "record_every=100")
+        yield "epoch of 500 members and 250 games, s", f"{total(timing):.2f}", ""
+        yield "  times that of 50 members and 25 games", f"{total(timing) / fifty:.1f}", "10"
+        yield "  its memory, MiB", f"{memory:.0f}", "6,144"
 
 
-def learner_rows() -> Iterator[Row]:
-    made = parts("population=ppo50", "population.islands.main.size=20")
-    learner, state = made.optimizer.islands[0].learner, begin(made).population.minds[0]
-    rng = np.random.default_rng(0)
-    length = learner.n_steps
-    experience = Experience(
-        members=np.arange(20).reshape(5, 4),
-        observations=rng.normal(size=(5, 4, length + 1, 45)).astype(np.float32),
-        actions=rng.integers(17, size=(5, 4, length)).astype(np.int16),
-        rewards=rng.normal(size=(5, 4, length)).astype(np.float32),
-        lengths=np.full(5, length),
-        terminated=np.ones(5, dtype=bool),
-    )
-    minibatches = learner.n_epochs * length / learner.minibatch_size
-    taken = seconds(lambda: learner.learn(state, experience, 0, np.random.default_rng(0), made.games.workers), 1)
-    ours = 1000 * taken / minibatches / 20
-    yield "PPO minibatch step a member, 20 members stacked, ms", f"{ours:.3f}", "(goal 0.15)"
+def side_by_side_rows() -> Iterator[Row]:
+    """Two runs at once, each with its default of workers, against one after the other."""
+    words = ["experiment=paper_comparison", "epochs=20", *TIMED]
+    with tempfile.TemporaryDirectory() as folder:
 
-    model = PPO("MlpPolicy", one_env(), device="cpu", n_steps=length)
-    model.learn(length)
-    torch.set_num_threads(available_cores())
-    theirs = 1000 * seconds(model.train, 1) / minibatches
-    torch.set_num_threads(1)
-    yield "the same with Stable-Baselines3's PPO.train, ms", f"{theirs:.3f}", ""
-    yield "ratio", f"{theirs / ours:.1f}", ""
-    seen = rng.normal(size=45).astype(np.float32)
-    yield "one action by Stable-Baselines3's predict, µs", f"{1e6 * seconds(lambda: model.predict(seen)):.0f}", ""
+        def commands() -> list[list[str]]:
+            return [[BERTEAM, "train", *words, f"out={folder}/{k}"] for k in range(2)]
 
-
-def one_env() -> Any:
-    import gymnasium  # noqa: PLC0415
-
-    class Noise(gymnasium.Env):
-        observation_space = gymnasium.spaces.Box(-1, 1, (45,), np.float32)
-        action_space = gymnasium.spaces.Discrete(17)
-
-        def reset(self, *, seed=None, options=None):
-            super().reset(seed=seed)
-            return self.observation_space.sample(), {}
-
-        def step(self, action):
-            return self.observation_space.sample(), 0.0, False, False, {}
-
-    return Noise()
+        started = time.perf_counter()
+        for command in commands():
+            subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
+        alone = time.perf_counter() - started
+        started = time.perf_counter()
+        both = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands()]
+        for process in both:
+            process.wait()
+        together = time.perf_counter() - started
+    yield "two runs side by side, times one after the other", f"{together / alone:.2f}", "1.1"
 
 
 def selector_rows() -> Iterator[Row]:
@@ -116,15 +103,13 @@ def selector_rows() -> Iterator[Row]:
 
 
 def start_rows() -> Iterator[Row]:
-    berteam = str(Path(sys.executable).with_name("berteam"))
-
     def quiet(*words: str) -> None:
-        subprocess.run([berteam, *words], stdout=subprocess.DEVNULL, check=True)
+        subprocess.run([BERTEAM, *words], stdout=subprocess.DEVNULL, check=True)
 
     yield "berteam --help, s", f"{seconds(lambda: quiet('--help')):.2f}", "0.5"
     with tempfile.TemporaryDirectory() as folder:
-        words = ["train", "epochs=0", "evaluation.games=0", f"out={folder}/run", "on_exists=overwrite"]
-        yield "berteam train until the first game, s", f"{seconds(lambda: quiet(*words), 1):.1f}", "5"
+        words = ["train", "epochs=0", *TIMED, f"out={folder}/run"]
+        yield "berteam train until the first game, s", f"{seconds(lambda: quiet(*words), 3):.1f}", "5"
 
 
-ROWS = (epoch_rows, learner_rows, selector_rows, start_rows)
+ROWS = (epoch_rows, side_by_side_rows, selector_rows, start_rows)
