@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from scipy.stats import t as student_t
+from scipy.special import stdtrit
 
 from berteam_cli.acting import Policies, fixed_policies, joined
 from berteam_cli.evaluation.reference import Reference
@@ -84,7 +84,7 @@ class Truth:
             mean = chosen.draws @ self.elos / drawn
             scatter = chosen.draws @ (self.elos - mean) ** 2 / (drawn - 1)  # the teams' own errors are in it
             variance = rest**2 * scatter / drawn
-            quantile = float(student_t.ppf(0.975, drawn - 1))
+            quantile = float(stdtrit(drawn - 1, 0.975))
             errors = np.where(chosen.listed, errors, 0.0)
         variance += ((weights * errors) ** 2).sum()
         return float(weights @ self.elos), float(quantile * np.sqrt(variance))

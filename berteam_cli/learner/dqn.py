@@ -187,10 +187,22 @@ class Dqn:
             column[child] = column[parent]
 
     def tensors(self, state: DqnState) -> dict[str, Any]:
-        """Returns all that ``state`` holds, by name."""
-        columns = {**state.trained._asdict(), "target": state.target, **state.replay._asdict()}
+        """Returns all that ``state`` holds, by name; of the replay buffers what the fullest one holds."""
+        replay = {name: column[:, : self.held(state)] for name, column in state.replay._asdict().items()}
+        columns = {**state.trained._asdict(), "target": state.target, **replay}
         columns["collected"] = state.collected
         return {name: torch.from_numpy(column) for name, column in columns.items()}
+
+    def held(self, state: DqnState) -> int:
+        """Returns how many steps the fullest replay buffer holds."""
+        return min(int(state.collected.max()), self.buffer_size)
+
+    def whole(self, held: dict[str, Any]) -> Replay:
+        """Returns replay buffers that begin with the columns ``held``, (M, steps), of ``tensors``."""
+        replay = empty(len(held["actions"]), self.buffer_size, self.observation_size)
+        for column, begun in zip(replay, (held[name] for name in Replay._fields), strict=True):
+            column[:, : begun.shape[1]] = begun
+        return replay
 
     def restored(self, tensors: dict[str, Any]) -> DqnState:
         """Returns the state that ``tensors`` gave these."""
@@ -198,6 +210,6 @@ class Dqn:
         return DqnState(
             Trained(*(columns[name] for name in Trained._fields)),
             columns["target"],
-            Replay(*(columns[name] for name in Replay._fields)),
+            self.whole({name: columns[name] for name in Replay._fields}),
             columns["collected"],
         )

@@ -140,16 +140,17 @@ class StackedDqn(Dqn):
         return gradient, torch.stack([loss, q.mean(dim=1)], dim=1).detach().double()
 
     def tensors(self, state: DqnState) -> dict[str, Any]:
-        """Returns all that ``state`` holds, by name."""
-        columns = {**state.trained._asdict(), "target": state.target, **state.replay._asdict()}
+        """Returns all that ``state`` holds, by name; of the replay buffers what the fullest one holds."""
+        replay = {name: column[:, : self.held(state)] for name, column in state.replay._asdict().items()}
+        columns = {**state.trained._asdict(), "target": state.target, **replay}
         return {**columns, "collected": torch.from_numpy(state.collected)}
 
     def restored(self, tensors: dict[str, Any]) -> DqnState:
         """Returns the state that ``tensors`` gave these, on the device."""
-        moved = {name: tensor.to(self.device, copy=True) for name, tensor in tensors.items() if name != "collected"}
+        replay = self.whole({name: tensors[name].cpu().numpy() for name in Replay._fields})
         return DqnState(
-            Trained(*(moved[name] for name in Trained._fields)),
-            moved["target"],
-            Replay(*(moved[name] for name in Replay._fields)),
+            Trained(*(tensors[name].to(self.device, copy=True) for name in Trained._fields)),
+            tensors["target"].to(self.device, copy=True),
+            Replay(*(on(self.device, column) for column in replay)),
             tensors["collected"].cpu().numpy().copy(),
         )

@@ -7,7 +7,6 @@ highest, every player's expected points equal the points it made.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
 
 from berteam_cli.outcomes import Floats
 from berteam_cli.rating.elo import POINTS_PER_NAT, nats, points
@@ -45,6 +44,8 @@ def ratings(scores: Floats, games: Floats) -> tuple[Floats, Floats]:
         loss += PRIOR_DRAWS * (np.logaddexp(0.0, -strengths) + 0.5 * strengths).sum()
         slope = (games * chances).sum(axis=1) + PRIOR_DRAWS * expected(strengths, 0.0) - made
         return float(loss), slope
+
+    from scipy.optimize import minimize  # noqa: PLC0415 (half a second, and only tournaments need it)
 
     fit = minimize(loss_and_slope, np.zeros(len(games)), jac=True, method="BFGS", options={"gtol": 1e-9})
     strengths = fit.x - fit.x.mean()
