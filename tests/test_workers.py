@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -31,3 +34,10 @@ def test_every_thread_leaves_torch_one(count=2):
 
 def test_there_is_a_core():
     assert available_cores() >= 1
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system does not say which cores a process has")
+def test_only_the_cores_a_process_may_use_count():
+    said = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))}); "
+    said += "from berteam_cli.workers import available_cores; print(available_cores())"
+    assert subprocess.run([sys.executable, "-c", said], capture_output=True, text=True, check=True).stdout == "1\n"
