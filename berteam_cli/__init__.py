@@ -3,10 +3,10 @@
 training.py      the loop of the paper's Algorithm 1
 selector/        who plays together: uniform, mcaa, berteam
 optimizer/       who stays in the population: coevolution, mapelites, fixed
-learner/         how a member learns from its own steps: ppo, dqn, sb3, fixed
+learner/         how a member learns from its own steps: ppo, dqn, sb3; fixed and imported do not
 env/             the games: mctf, rps
 rating/          Elo
 evaluation/      tournaments and the true strength of teams
 """
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

@@ -15,7 +15,7 @@ import torch
 from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
-from berteam_cli.errors import RunError
+from berteam_cli.errors import InputError, RunError
 from berteam_cli.population import ARRAYS, Population
 from berteam_cli.training import Parts, Run
 
@@ -95,6 +95,21 @@ def load(folder: Path, parts: Parts) -> Saved:
             damage = f"{place.name} is damaged: {error}"
             log.warning("Checkpoint %s; the one before is tried.", damage)
     raise RunError(f"{folder} has no checkpoint to go on from ({damage}).")
+
+
+def check_schema(folder: Path) -> None:
+    """Checks that this version reads the checkpoints under ``folder``, as far as they can be read at all.
+
+    Raises:
+        InputError: they are another version's.
+    """
+    for place in (folder / "checkpoint").glob("epoch_*"):
+        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+            if (schema := json.loads((place / "state.json").read_text(encoding="utf-8"))["schema"]) != SCHEMA:
+                raise InputError(
+                    f"{folder} is a run of another version of berteam, whose checkpoints (schema {schema}, "
+                    f"not {SCHEMA}) this one does not read; use that version, or begin anew with on_exists=overwrite."
+                )
 
 
 def read(place: Path, parts: Parts) -> Saved:

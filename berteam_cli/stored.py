@@ -10,6 +10,7 @@ import yaml
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from berteam_cli.checkpoint import check_schema
 from berteam_cli.config import SCHEMAS, IslandConfig, TrainConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import CONFIG
@@ -46,8 +47,9 @@ def stored_config(folder: Path) -> DictConfig:
     """Returns the config of the training run in ``folder``, with its schemas.
 
     Raises:
-        InputError: it cannot be read, or is not a training's.
+        InputError: it cannot be read, is not a training's or another version's.
     """
+    check_schema(folder)
     plain = plain_config(folder)
     try:
         typed = OmegaConf.structured(TrainConfig)

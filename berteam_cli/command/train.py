@@ -70,6 +70,7 @@ def resumed(config: TrainConfig, text: str, folder: Path, parts: Parts) -> Saved
     """
     if not goes_on(config, folder):
         return None
+    checkpoint.check_schema(folder)
     check_same(folder, text)
     saved = checkpoint.load(folder, parts)
     done = saved.run.epoch

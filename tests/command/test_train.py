@@ -245,6 +245,18 @@ def test_resume_refuses_what_would_not_be_the_same_run(berteam, tmp_path):
     assert "is no folder of a run" in berteam("inspect", "run", code=2).stderr
 
 
+def test_a_run_of_another_version_is_refused_before_anything_else(berteam, tmp_path):
+    words = ["env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "out=run"]
+    berteam("train", *words, "epochs=2")
+    for state in (tmp_path / "run" / "checkpoint").glob("*/state.json"):
+        state.write_text(state.read_text().replace('"schema": 2', '"schema": 1'))
+    config = (tmp_path / "run" / "config.yaml").read_text()
+    (tmp_path / "run" / "config.yaml").write_text(config.replace("epochs: 2\n", "epochs: 2\nforgotten: 1\n"))
+    for command in (["resume", "run"], ["train", *words, "on_exists=resume"], ["tournament", "run=run"]):
+        assert "run of another version of berteam" in berteam(*command, code=2).stderr
+    berteam("train", *words, "epochs=1", "on_exists=overwrite")
+
+
 def test_a_sweep_does_not_take_another_ones_runs_for_its_own(berteam, tmp_path):
     words = ["-m", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "hydra.sweep.dir=sweep"]
     berteam("train", *words, "seed=0,1", "epochs=2")
