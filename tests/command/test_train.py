@@ -245,6 +245,22 @@ def test_resume_refuses_what_would_not_be_the_same_run(berteam, tmp_path):
     assert "is no folder of a run" in berteam("inspect", "run", code=2).stderr
 
 
+def test_a_run_goes_on_where_updates_explode(berteam, tmp_path):
+    words = ["env=rps", "population=ppo6", "selector=uniform", "games_per_epoch=12", "epochs=12"]
+    words += ["learner.n_steps=16", "learner.minibatch_size=8", "learner.activation=relu", "learner.max_grad_norm=1e9"]
+    words += ["learner.learning_rate=1e9", "learner.value_coef=1e9", "optimizer.protect_new=2"]
+    said = berteam("train", *words, "out=whole").stdout
+    assert "Updates gave weights or a loss that are not finite, and were undone; of members:" in said
+    learning = read(tmp_path / "whole", "learning")
+    assert learning.failures.sum() > 10
+    assert learning.loss[learning.failures > 0].isna().any()
+    assert np.isfinite(read(tmp_path / "whole", "elo").elo).all()
+    berteam("train", *words, "workers=1", "epochs=7", "out=parts")
+    berteam("resume", "parts", "epochs=12")
+    for name in UNTIMED:
+        assert (tmp_path / "parts" / f"{name}.csv").read_bytes() == (tmp_path / "whole" / f"{name}.csv").read_bytes()
+
+
 def test_a_run_of_another_version_is_refused_before_anything_else(berteam, tmp_path):
     words = ["env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "out=run"]
     berteam("train", *words, "epochs=2")
