@@ -109,9 +109,10 @@ def value_slope(loss: Surrogate, values: Singles, sample: Sample, slope: Singles
     reach = np.float32(loss.clip_range_vf)
     for i in range(n):
         moved = values[i, 0] - sample.values[i]
-        bounded = min(max(moved, -reach), reach)
-        error = sample.values[i] + bounded - sample.returns[i] if bounded != moved else values[i, 0] - sample.returns[i]
-        slope[i, 0] = 2.0 * loss.value_coef * error / n if bounded == moved else np.float32(0.0)
+        free = abs(moved) <= reach
+        value = values[i, 0] if free else sample.values[i] + math.copysign(reach, moved)
+        error = value - sample.returns[i]
+        slope[i, 0] = 2.0 * loss.value_coef * error / n if free else 0.0  # where the bound holds, it is constant
         figures[0] += loss.value_coef * error * error
         figures[2] += error * error
 
