@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -167,8 +168,7 @@ class Ppo:
             failures += of_update is None
             state.filled[row] = 0
             used += append(state.rollouts, state.filled, row, new, used)
-        means = dict(zip(FIGURES, np.mean(figures, axis=0).tolist(), strict=True)) if figures else {}
-        return Learning(row, int(state.trained.updates[row]) - taken, **means, steps=used, failures=failures)
+        return learning(row, figures, int(state.trained.updates[row]) - taken, used, failures)
 
     def update(self, state: PpoState, row: int, rng: Generator) -> Floats:
         """Lets a member learn from its full rollout; returns (len(FIGURES),) figures."""
@@ -221,6 +221,20 @@ class Ppo:
             Steps(*(columns[name] for name in Steps._fields)),
             columns["filled"],
         )
+
+
+def learning(row: int, figures: Sequence[Floats], updates: int, steps: int, failures: int) -> Learning:
+    """Returns what a member learnt.
+
+    Args:
+        row: the member within its island.
+        figures: (len(FIGURES),) of each update that was not undone.
+        updates: gradient steps.
+        steps: transitions that arrived.
+        failures: updates that were undone.
+    """
+    means = dict(zip(FIGURES, np.mean(figures, axis=0).tolist(), strict=True)) if figures else {}
+    return Learning(row, updates, **means, steps=steps, failures=failures)
 
 
 def outputs(weights: Singles, sizes: tuple[int, ...], smooth: bool, observations: Singles) -> Singles:

@@ -14,7 +14,7 @@ from berteam_cli.acting import Policies
 from berteam_cli.learner.adam import Trained
 from berteam_cli.learner.base import Learning
 from berteam_cli.learner.mlp import weight_count
-from berteam_cli.learner.ppo import Ppo, PpoState
+from berteam_cli.learner.ppo import Ppo, PpoState, learning
 from berteam_cli.learner.rollout import Seen, Steps, advantages, append, seen, stitched
 from berteam_cli.learner.stacked import descend, on, outputs, put_where_finite, taken
 from berteam_cli.learner.surrogate import FIGURES, KL, Sample
@@ -65,16 +65,7 @@ class StackedPpo(Ppo):
                 state.filled[row] = 0
                 used[row] += append(state.rollouts, state.filled, row, new[row], used[row])
         after = state.trained.updates.tolist()
-        return [
-            Learning(
-                row,
-                after[row] - before[row],
-                **(dict(zip(FIGURES, np.mean(figures[row], axis=0).tolist(), strict=True)) if figures[row] else {}),
-                steps=used[row],
-                failures=failures[row],
-            )
-            for row in rows
-        ]
+        return [learning(row, figures[row], after[row] - before[row], used[row], failures[row]) for row in rows]
 
     def judged_together(self, state: PpoState, rows: list[int], saw: list[Seen]) -> list[Steps]:
         """Returns the new steps of each member, with what its networks say of them before it learns."""
