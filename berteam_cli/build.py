@@ -57,12 +57,13 @@ def env(config: EnvConfig, team_size: int) -> Env:
         raise InputError(f"env.{error}") from error
 
 
-def parts(config: TrainConfig, *, stored: bool = False) -> Parts:
+def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False) -> Parts:
     """Returns everything a run is made of.
 
     Args:
         config: checked.
         stored: whether the run has a checkpoint, which holds the members from files too: the files may be gone.
+        read_only: whether nobody is to learn, and so no room is needed for what they would learn from.
 
     Raises:
         InputError: parts of the config do not go together.
@@ -77,8 +78,9 @@ def parts(config: TrainConfig, *, stored: bool = False) -> Parts:
         )
     field = Field(island_of(islands), config.team_size)
     improving = optimizer(config, islands, playing)
-    games_kept = config.games_per_epoch if improving.learns else 0
-    check_memory(islands, playing.env, games_kept)
+    games_kept = config.games_per_epoch if improving.learns and not read_only else 0
+    if not read_only:
+        check_memory(islands, playing.env, games_kept)
     return Parts(
         seed=config.seed,
         games_per_epoch=config.games_per_epoch,
@@ -91,7 +93,7 @@ def parts(config: TrainConfig, *, stored: bool = False) -> Parts:
 
 def parts_to_read(config: TrainConfig) -> Parts:
     """Returns the parts of a run that is only looked at: on the processor, wherever its members learnt."""
-    return parts(replace(config, device="cpu"), stored=True)
+    return parts(replace(config, device="cpu"), stored=True, read_only=True)
 
 
 def chosen_device(name: str) -> str:

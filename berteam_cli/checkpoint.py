@@ -124,7 +124,9 @@ def read(place: Path, parts: Parts) -> Saved:
     if digest(place / "tensors.safetensors") != said["sha256"]:
         raise ValueError("its checksum is wrong")
     # In memory of their own: by where a tensor lies torch chooses its kernels, and so the last bits of what comes out.
-    tensors = {name: tensor.clone() for name, tensor in load_file(place / "tensors.safetensors").items()}
+    tensors = load_file(place / "tensors.safetensors")
+    for name in tensors:
+        tensors[name] = tensors[name].clone()
     minds = tuple(
         island.learner.restored(below(tensors, f"island.{i}.")) for i, island in enumerate(parts.optimizer.islands)
     )
@@ -140,7 +142,13 @@ def tensors_of(run: Run, parts: Parts) -> dict[str, torch.Tensor]:
     for i, (island, mind) in enumerate(zip(parts.optimizer.islands, run.population.minds, strict=True)):
         tensors |= {f"island.{i}.{name}": tensor for name, tensor in island.learner.tensors(mind).items()}
     tensors |= {f"selector.{name}": tensor for name, tensor in parts.selector.tensors(run.selection).items()}
-    return {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+    return {name: alone(tensor.detach().cpu().contiguous()) for name, tensor in tensors.items()}
+
+
+def alone(tensor: torch.Tensor) -> torch.Tensor:
+    """Returns ``tensor``, or a copy where it is part of a larger one, whose memory another part may share."""
+    whole = tensor.untyped_storage().nbytes() == tensor.nbytes
+    return tensor if whole else tensor.clone()
 
 
 def below(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:

@@ -227,8 +227,8 @@ class PpoConfig(LearnerConfig):
     network: list[int] = MISSING
     activation: str = choice("tanh", "relu")
     learning_rate: float = number(open_low=True)
-    n_steps: int = number(2)
-    minibatch_size: int = number(2)
+    n_steps: int = number(1)
+    minibatch_size: int = number(1)
     n_epochs: int = number(1)
     gamma: float = number(0, 1)
     gae_lambda: float = number(0, 1)

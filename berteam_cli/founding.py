@@ -166,5 +166,7 @@ def check_settings(settings: dict[str, Any], key: str) -> None:
         raise InputError(
             f"{key}.n_steps must be a multiple of {key}.minibatch_size={minibatch}, such as {near}, but is {steps}."
         )
+    if minibatch == 1 and settings["normalize_advantage"]:
+        raise InputError(f"{key}.minibatch_size must be >= 2 with {key}.normalize_advantage=true, but is 1.")
     if settings.get("gradient_steps") == 0:
         raise InputError(f"{key}.gradient_steps must be >= 1, or -1 for as many as transitions, but is 0.")

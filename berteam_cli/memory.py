@@ -8,10 +8,14 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+import torch
+
 from berteam_cli.env.base import Env, trajectory_bytes
 from berteam_cli.errors import InputError
 from berteam_cli.population import Island
 
+BASE = 3 * 2**28  # bytes of the interpreter with torch, and of BERTeam's network
+COPIES = 2  # a checkpoint holds what it writes a second time, and so does a run that goes on until it has read it
 GROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
 
@@ -34,11 +38,16 @@ def spoken(size: float) -> str:
 
 def needed(islands: tuple[Island, ...], env: Env, games: int) -> tuple[int, int]:
     """Returns the bytes that the members take, weights and buffers, and those of trajectories of ``games`` games."""
-    return sum(island.learner.state_bytes(island.size) for island in islands), trajectory_bytes(env, games)
+    return sum(state_bytes(island) for island in islands), trajectory_bytes(env, games)
+
+
+def state_bytes(island: Island) -> int:
+    """Returns the bytes that the members of ``island`` take."""
+    return island.learner.state_bytes(island.size)
 
 
 def check_memory(islands: tuple[Island, ...], env: Env, games: int) -> None:
-    """Checks that what a run keeps in memory fits there.
+    """Checks that what a run keeps in memory fits there, that of each device on it.
 
     Args:
         islands: of the population.
@@ -48,21 +57,44 @@ def check_memory(islands: tuple[Island, ...], env: Env, games: int) -> None:
     Raises:
         InputError: it does not; with the setting that takes most and the largest value that would fit.
     """
-    members, played = needed(islands, env, games)
-    limit, total = available(), members + played
+    for device in ("cpu", "cuda"):
+        there = [island for island in islands if getattr(island.learner, "device", "cpu") == device]
+        if device == "cpu":
+            whole = available()
+            fits_there(there, trajectory_bytes(env, games), games, (whole - BASE) // COPIES, whole)
+        elif there:
+            free, whole = torch.cuda.mem_get_info()
+            fits_there(there, 0, games, free, whole)
+
+
+def fits_there(islands: list[Island], played: int, games: int, limit: int, whole: int) -> None:
+    """Checks that members and the trajectories of ``games`` games, of ``played`` bytes, take at most ``limit`` bytes.
+
+    Args:
+        islands: the members.
+        played: bytes.
+        games: of one epoch.
+        limit: bytes.
+        whole: bytes that there are, for the message.
+
+    Raises:
+        InputError: they take more.
+    """
+    members = sum(state_bytes(island) for island in islands)
+    total = members + played
     if total <= limit:
         return
-    said = f"the run would need {spoken(total)} of memory, and there are {spoken(limit)}"
-    largest = max(islands, key=lambda island: island.learner.state_bytes(island.size))
-    takes = largest.learner.state_bytes(largest.size)
-    if played > takes:
-        fits = (limit - members) * games // played
-        raise InputError(f"games_per_epoch must be <= {max(fits, 0)}, but is {games}: {said}.")
-    key, learner, fits = largest.learner.buffer, largest.learner, 0
+    said = f"members and games would take {spoken(total)} of memory, and may take {spoken(limit)} of {spoken(whole)}"
+    largest = max(islands, key=state_bytes, default=None)
+    takes = state_bytes(largest) if largest else 0
+    if largest is None or played > takes:
+        most = max((limit - members) * games // played, 0)
+        raise InputError(f"games_per_epoch must be <= {most}, but is {games}: {said}.")
+    key, learner, most = largest.learner.buffer, largest.learner, 0
     if key:
         one, two = (replace(learner, **{key: size}).state_bytes(largest.size) for size in (1, 2))
-        fits = 1 + (limit - (total - takes) - one) // (two - one)
+        most = 1 + (limit - (total - takes) - one) // (two - one)
     name = f"population.islands.{largest.name}"
-    if fits < 1:
+    if most < 1:
         raise InputError(f"{name}.size is {largest.size}, too many members of {spoken(takes)} together: {said}.")
-    raise InputError(f"{name}.learner.{key} must be <= {fits}, but is {getattr(learner, key)}: {said}.")
+    raise InputError(f"{name}.learner.{key} must be <= {most}, but is {getattr(learner, key)}: {said}.")

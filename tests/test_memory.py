@@ -43,7 +43,7 @@ def limited(monkeypatch, learner, setting, limit):
 
 @pytest.mark.parametrize(("learner", "key", "step"), [("dqn", "buffer_size", 1), ("ppo", "n_steps", 64)])
 def test_the_largest_buffer_that_is_said_to_fit_does(learner, key, step, monkeypatch):
-    limit = 300 * 2**20
+    limit = 2 * 2**30
     with pytest.raises(InputError) as refused:
         limited(monkeypatch, learner, f"learner.{key}=64000000", limit)
     fits = int(str(refused.value).split("<= ")[1].split(",")[0]) // step * step

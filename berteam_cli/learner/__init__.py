@@ -4,4 +4,6 @@ from pathlib import Path
 
 from mctf.cache import forget_stale
 
-forget_stale(Path(__file__).parent, Path(__file__).parent.parent)
+_here = Path(__file__).parent
+forget_stale(_here, _here.parent)
+forget_stale(_here.parent)

@@ -85,4 +85,4 @@ class Learner(Protocol[S]):
         """Returns all that ``state`` holds as named torch tensors (no copies), for a checkpoint."""
 
     def restored(self, tensors: dict[str, Any]) -> S:
-        """Returns the state that ``tensors`` gave these."""
+        """Returns the state that ``tensors`` gave these, which may share their memory."""

@@ -15,8 +15,8 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, layers, uniform, weight_count
 from berteam_cli.learner.replay import Replay, empty, remember
-from berteam_cli.learner.temporal import Difference, learn_steps, schedule
-from berteam_cli.outcomes import Bools, Experience, Floats, Ints
+from berteam_cli.learner.temporal import Difference, follow, learn_steps, schedule
+from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
 ADAM_EPSILON = 1e-8  # torch's, which Stable-Baselines3 leaves for DQN
@@ -107,9 +107,10 @@ class Dqn:
         return DqnState(untrained(weights), weights.copy(), replay, np.zeros(members, dtype=np.int64))
 
     def epsilon(self, collected: Ints) -> Floats:
-        """Returns the chance of a random action after ``collected`` steps."""
+        """Returns the chance of a random action after ``collected`` steps; before a member learns it is 1."""
         progress = np.minimum(collected / self.exploration_steps, 1.0)
-        return self.exploration_initial + progress * (self.exploration_final - self.exploration_initial)
+        falling = self.exploration_initial + progress * (self.exploration_final - self.exploration_initial)
+        return np.where(collected < self.learning_starts, 1.0, falling)
 
     def policies(self, state: DqnState, *, explore: bool) -> Policies:
         """Returns the members' greedy policies, which err at random as their schedules say if they ``explore``."""
@@ -151,14 +152,15 @@ class Dqn:
         count, renewals = self.plan(before, after)
         batches = self.batches(after, count, rng)
         columns = (*state.trained, state.target)
-        figures = guarded(columns, row, lambda: self.steps_taken(state, row, batches, renewals))
+        figures = guarded(columns, row, 2, lambda: self.steps_taken(state, row, batches, renewals))
         learning = Learning(row, epsilon=float(self.epsilon(state.collected[row])), steps=after - before)
-        if figures is None:
+        if figures is None:  # what is undone does not delay the target
+            follow(state.target[row], state.trained.weights[row], self.tau, int(renewals.sum()))
             return replace(learning, failures=1)
         means = dict(zip(("loss", "q_value"), figures.tolist(), strict=True)) if count else {}
         return replace(learning, updates=count, **means)
 
-    def plan(self, before: int, after: int) -> tuple[int, Bools]:
+    def plan(self, before: int, after: int) -> tuple[int, Ints]:
         """Returns how many gradient steps are due after step ``after``, and when targets are renewed; ``schedule``."""
         each = self.train_freq if self.gradient_steps == -1 else self.gradient_steps
         return schedule(before, after, self.train_freq, each, self.learning_starts, self.target_update_interval)
@@ -167,7 +169,7 @@ class Dqn:
         """Returns (count, batch_size) places in the ring of a member that has ``collected`` so many steps."""
         return rng.integers(0, min(collected, self.buffer_size), (count, self.batch_size))
 
-    def steps_taken(self, state: DqnState, row: int, batches: Ints, renewals: Bools) -> Floats:
+    def steps_taken(self, state: DqnState, row: int, batches: Ints, renewals: Ints) -> Floats:
         """Takes a gradient step of one member for each of ``batches``; returns the means of loss and of Q."""
         return learn_steps(
             Difference(self.gamma, self.n_steps, self.tau, self.smooth),
@@ -206,7 +208,7 @@ class Dqn:
 
     def restored(self, tensors: dict[str, Any]) -> DqnState:
         """Returns the state that ``tensors`` gave these."""
-        columns = {name: tensor.numpy().copy() for name, tensor in tensors.items()}
+        columns = {name: tensor.numpy() for name, tensor in tensors.items()}
         return DqnState(
             Trained(*(columns[name] for name in Trained._fields)),
             columns["target"],

@@ -71,7 +71,7 @@ def ppo(learner: Ppo, state: PpoState, row: int, space: Box) -> PPO:
         policy, (policy.mlp_extractor.value_net, policy.value_net), section(member, cut, None), learner.value_sizes
     )
     model._n_updates = int(member.updates[0]) // -(-learner.n_steps // learner.minibatch_size)
-    model.num_timesteps = model._n_updates // learner.n_epochs * learner.n_steps + int(state.filled[row])
+    model.num_timesteps = int(state.collected[row])
     return model
 
 

@@ -17,7 +17,7 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, forward, layers, n_values, orthogonal, weight_count
 from berteam_cli.learner.rollout import Steps, advantages, append, empty, seen, stitched
-from berteam_cli.learner.surrogate import FIGURES, Sample, Surrogate, log_chances, one_update
+from berteam_cli.learner.surrogate import FIGURES, LOSSES, Sample, Surrogate, log_chances, one_update
 from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
@@ -31,11 +31,13 @@ class PpoState(NamedTuple):
         trained: weights, of the policy network before those of the value network, and Adam's moments.
         rollouts: (M, n_steps) steps made with these weights, not learnt from yet.
         filled: (M,) how many steps of each rollout there are.
+        collected: (M,) steps each member has made in all, those of whom it is a copy included.
     """
 
     trained: Trained
     rollouts: Steps
     filled: Ints
+    collected: Ints
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ class Ppo:
         return PpoState(
             untrained(np.concatenate([policy, value], axis=1)),
             empty(members, self.n_steps, self.observation_size),
-            np.zeros(members, dtype=np.int64),
+            *np.zeros((2, members), dtype=np.int64),
         )
 
     def policies(self, state: PpoState, *, explore: bool) -> Policies:
@@ -127,7 +129,7 @@ class Ppo:
         """Returns the bytes of weights with Adam's moments, and of rollouts."""
         weights = weight_count(np.array(self.policy_sizes)) + weight_count(np.array(self.value_sizes))
         a_step = 4 * self.observation_size + 2 + 4 * 4 + 1
-        return members * (3 * 4 * int(weights) + 8 + self.n_steps * a_step + 8)
+        return members * (3 * 4 * int(weights) + 8 + self.n_steps * a_step + 2 * 8)
 
     def names(self, state: PpoState, island: str) -> list[str]:
         """Returns the island's name with the member's number in it."""
@@ -163,11 +165,12 @@ class Ppo:
         failures, taken = 0, int(state.trained.updates[row])
         used = append(state.rollouts, state.filled, row, new, 0)
         while state.filled[row] == self.n_steps:
-            of_update = guarded(state.trained, row, lambda: self.update(state, row, rng))
+            of_update = guarded(state.trained, row, LOSSES, lambda: self.update(state, row, rng))
             figures += [] if of_update is None else [of_update]
             failures += of_update is None
             state.filled[row] = 0
             used += append(state.rollouts, state.filled, row, new, used)
+        state.collected[row] += used
         return learning(row, figures, int(state.trained.updates[row]) - taken, used, failures)
 
     def update(self, state: PpoState, row: int, rng: Generator) -> Floats:
@@ -199,27 +202,25 @@ class Ppo:
 
     def copy(self, state: PpoState, child: int, parent: int) -> None:
         """Makes ``child`` a copy of ``parent`` with an empty rollout, since the parent's steps are not its own."""
-        for column in state.trained:
+        for column in (*state.trained, state.collected):
             column[child] = column[parent]
         for column in (*state.rollouts, state.filled):
             column[child] = 0
 
     def tensors(self, state: PpoState) -> dict[str, Any]:
         """Returns all that ``state`` holds, by name."""
-        columns = {
-            **state.trained._asdict(),
-            **state.rollouts._asdict(),
-            "filled": state.filled,
-        }
+        columns = {**state.trained._asdict(), **state.rollouts._asdict()}
+        columns |= {"filled": state.filled, "collected": state.collected}
         return {name: torch.from_numpy(column) for name, column in columns.items()}
 
     def restored(self, tensors: dict[str, Any]) -> PpoState:
         """Returns the state that ``tensors`` gave these."""
-        columns = {name: tensor.numpy().copy() for name, tensor in tensors.items()}
+        columns = {name: tensor.numpy() for name, tensor in tensors.items()}
         return PpoState(
             Trained(*(columns[name] for name in Trained._fields)),
             Steps(*(columns[name] for name in Steps._fields)),
             columns["filled"],
+            columns["collected"],
         )
 
 

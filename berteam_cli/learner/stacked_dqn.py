@@ -17,7 +17,7 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.dqn import Dqn, DqnState
 from berteam_cli.learner.replay import Replay, latest
 from berteam_cli.learner.stacked import descend, on, outputs, put_where_finite, taken
-from berteam_cli.outcomes import Bools, Experience, Ints
+from berteam_cli.outcomes import Experience, Ints
 from berteam_cli.workers import Workers
 
 
@@ -73,7 +73,7 @@ class StackedDqn(Dqn):
         return learnt
 
     def stepped(
-        self, state: DqnState, rows: list[int], batches: list[Ints], renewals: list[Bools]
+        self, state: DqnState, rows: list[int], batches: list[Ints], renewals: list[Ints]
     ) -> tuple[list[list[float]], list[bool]]:
         """Takes gradient steps of the members ``rows``, some more than others.
 
@@ -89,7 +89,7 @@ class StackedDqn(Dqn):
         counts = on(self.device, np.array([len(x) for x in batches]))
         most = max(len(x) for x in batches)
         at = np.zeros((len(rows), most, self.batch_size), dtype=np.int64)
-        renews = np.zeros((len(rows), most + 1), dtype=np.bool_)
+        renews = np.zeros((len(rows), most + 1), dtype=np.int64)
         for k, (places, targets) in enumerate(zip(batches, renewals, strict=True)):
             at[k, : len(places)], renews[k, : len(targets)] = places, targets
         chosen = torch.tensor(rows, device=self.device)
@@ -99,7 +99,7 @@ class StackedDqn(Dqn):
         sums = torch.zeros(len(rows), 2, dtype=torch.float64, device=self.device)
         places, renewing = on(self.device, at), on(self.device, renews)
         for step in range(most + 1):
-            target += torch.where(renewing[:, step, None], self.tau * (trained.weights - target), 0.0)
+            target = self.followed(target, trained.weights, renewing[:, step])
             if step == most:
                 break
             active = step < counts
@@ -108,7 +108,15 @@ class StackedDqn(Dqn):
             descend(self.adam, trained, gradient, active)
         means = sums / counts.clamp(min=1)[:, None]
         sound = put_where_finite((*state.trained, state.target), chosen, (*trained, target), means)
+        for row, times, well in zip(rows, renewing.sum(dim=1), sound, strict=True):
+            if not well:  # what is undone does not delay the target
+                state.target[row] = self.followed(state.target[row], state.trained.weights[row], times)
         return means.tolist(), sound
+
+    def followed(self, target: Tensor, weights: Tensor, times: Tensor) -> Tensor:
+        """Returns ``target``, shape (..., W), after it moved to ``weights`` so many ``times``, shape (...)."""
+        stays = (1.0 - self.tau) ** times[..., None]
+        return target * stays + weights * (1.0 - stays)
 
     def gradient(
         self, state: DqnState, rows: Tensor, newest: Tensor, at: Tensor, weights: Tensor, target: Tensor

@@ -17,7 +17,7 @@ from berteam_cli.learner.mlp import weight_count
 from berteam_cli.learner.ppo import Ppo, PpoState, learning
 from berteam_cli.learner.rollout import Seen, Steps, advantages, append, seen, stitched
 from berteam_cli.learner.stacked import descend, on, outputs, put_where_finite, taken
-from berteam_cli.learner.surrogate import FIGURES, KL, Sample
+from berteam_cli.learner.surrogate import FIGURES, KL, LOSSES, Sample
 from berteam_cli.outcomes import Experience
 from berteam_cli.workers import Workers
 
@@ -64,6 +64,8 @@ class StackedPpo(Ppo):
                 failures[row] += not well
                 state.filled[row] = 0
                 used[row] += append(state.rollouts, state.filled, row, new[row], used[row])
+        for row in rows:
+            state.collected[row] += used[row]
         after = state.trained.updates.tolist()
         return [learning(row, figures[row], after[row] - before[row], used[row], failures[row]) for row in rows]
 
@@ -118,7 +120,7 @@ class StackedPpo(Ppo):
             last = torch.where(in_pass, divergence / seen_in_pass, last)
         means = sums / seen_in_all[:, None]
         means[:, KL] = last
-        return means.tolist(), put_where_finite(state.trained, rows, trained, means)
+        return means.tolist(), put_where_finite(state.trained, rows, trained, means[:, :LOSSES])
 
     def samples(self, state: PpoState, rows: Tensor) -> Sample:
         """Returns the full rollouts of the members ``rows`` with their advantages and returns, (K, n_steps)."""
@@ -161,12 +163,13 @@ class StackedPpo(Ppo):
     def tensors(self, state: PpoState) -> dict[str, Any]:
         """Returns all that ``state`` holds, by name."""
         columns = {**state.trained._asdict(), **state.rollouts._asdict()}
-        return {**columns, "filled": torch.from_numpy(state.filled)}
+        counts = {"filled": state.filled, "collected": state.collected}
+        return {**columns, **{name: torch.from_numpy(column) for name, column in counts.items()}}
 
     def restored(self, tensors: dict[str, Any]) -> PpoState:
         """Returns the state that ``tensors`` gave these, on the device."""
         return PpoState(
             Trained(*(tensors[name].to(self.device, copy=True) for name in Trained._fields)),
             Steps(*(tensors[name].to(self.device, copy=True) for name in Steps._fields)),
-            tensors["filled"].cpu().numpy().copy(),
+            *(tensors[name].cpu().numpy().copy() for name in ("filled", "collected")),
         )

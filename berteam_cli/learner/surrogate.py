@@ -14,6 +14,7 @@ from berteam_cli.learner.mlp import Singles, backward, compiled, forward, n_valu
 from berteam_cli.outcomes import Floats
 
 FIGURES = ("loss", "policy_loss", "value_loss", "entropy", "approx_kl", "clip_fraction")
+LOSSES = 3  # the first figures, which must be finite
 KL = FIGURES.index("approx_kl")
 
 

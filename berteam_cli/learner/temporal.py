@@ -9,12 +9,12 @@ import numpy as np
 from berteam_cli.learner.adam import Adam, Trained, descend
 from berteam_cli.learner.mlp import Singles, backward, compiled, forward, n_values
 from berteam_cli.learner.replay import Replay
-from berteam_cli.outcomes import Bools, Floats, Ints
+from berteam_cli.outcomes import Floats, Ints
 
 
 def schedule(
     before: int, after: int, train_freq: int, gradient_steps: int, learning_starts: int, target_update_interval: int
-) -> tuple[int, Bools]:
+) -> tuple[int, Ints]:
     """Returns how many gradient steps a member takes, and when its target is renewed.
 
     Both follow from the number of steps it has made, as if it had learnt while it played: gradient steps after
@@ -30,13 +30,13 @@ def schedule(
         target_update_interval: steps between new targets.
 
     Returns:
-        The number k of gradient steps; and (k + 1,) whether the target is renewed before each of them, and at
+        The number k of gradient steps; and (k + 1,) how often the target is renewed before each of them, and at
         the end.
     """
     begin = max(before, learning_starts) // train_freq + 1
     learnings = np.repeat(np.arange(begin, after // train_freq + 1) * train_freq, gradient_steps)
     times = np.concatenate([[before], learnings, [after]])
-    return len(learnings), np.diff(times // target_update_interval) > 0
+    return len(learnings), np.diff(times // target_update_interval)
 
 
 class Difference(NamedTuple):
@@ -65,7 +65,7 @@ def learn_steps(
     ring: Replay,
     newest: int,
     batches: Ints,
-    renewals: Bools,
+    renewals: Ints,
 ) -> Floats:
     """Takes gradient steps on the smooth absolute error of Q; returns the means of loss and of Q.
 
@@ -78,7 +78,7 @@ def learn_steps(
         ring: the member's.
         newest: where in the ring the member's last step is.
         batches: (k, n) places in the ring, for each gradient step.
-        renewals: (k + 1,) whether the target is renewed before each gradient step, and at the end.
+        renewals: (k + 1,) how often the target is renewed before each gradient step, and at the end.
     """
     steps, n = batches.shape
     gradient = np.empty_like(member.weights)
@@ -87,8 +87,7 @@ def learn_steps(
     goals, discounts, last = np.empty(n, np.float32), np.empty(n, np.float32), np.empty(n, np.int64)
     figures = np.zeros(2)
     for k in range(steps):
-        if renewals[k]:
-            follow(target, member.weights, difference.tau)
+        follow(target, member.weights, difference.tau, renewals[k])
         at = batches[k]
         add_rewards(difference, ring, newest, at, goals, discounts, last)
         future = forward(target, sizes, difference.smooth, ring.next_observations[last], values)
@@ -107,16 +106,18 @@ def learn_steps(
             figures[1] += q[i, action] / n
         backward(member.weights, sizes, difference.smooth, observations, values, slope, gradient)
         descend(adam, member, gradient)
-    if renewals[steps]:
-        follow(target, member.weights, difference.tau)
+    follow(target, member.weights, difference.tau, renewals[steps])
     return figures / max(steps, 1)
 
 
 @compiled
-def follow(target: Singles, weights: Singles, tau: float) -> None:
-    """Moves ``target``, shape (W,), a share ``tau`` of its way to ``weights``."""
+def follow(target: Singles, weights: Singles, tau: float, times: int) -> None:
+    """Moves ``target``, shape (W,), a share ``tau`` of its way to ``weights``, so many times."""
+    if times == 0:
+        return
+    stays = (1.0 - tau) ** times
     for j in range(len(target)):
-        target[j] = target[j] * np.float32(1.0 - tau) + weights[j] * np.float32(tau)
+        target[j] = target[j] * np.float32(stays) + weights[j] * np.float32(1.0 - stays)
 
 
 @compiled

@@ -66,7 +66,8 @@ class Coevolution(Fixed):
         """Replaces members whose weights no update can move to finite ones; changes the population's arrays.
 
         One update that was undone is bad luck, and the member goes on from its last good weights. If nothing but
-        such updates came twice in a row, it becomes a copy of its parent, or of the fittest of its island.
+        such updates came twice in a row, it becomes a copy of who is on its parent's place, or of the fittest of its
+        island.
         """
         failed = [(self.islands[i], i, self.islands[i].first + x.row) for i, x in learnt if x.failures]
         if failed:

@@ -6,6 +6,7 @@ crowded is replaced by how far its fitness falls short of its neighbours' mean.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,8 +75,10 @@ class MapElites(Coevolution):
             return np.zeros(0, dtype=np.int64), empty()
         allowed = self.candidates(population, island)
         near, radius = nearest(population.behaviour[island.members])[allowed - island.first], self.radius
-        if self.lambda_growth > 1 and np.isfinite(near).any():
-            while not (near < radius).any():
+        if self.lambda_growth > 1 and len(near) and radius <= near.min() < np.inf:
+            times = math.floor(math.log(near.min() / radius) / math.log(self.lambda_growth))
+            radius *= self.lambda_growth**times
+            while radius <= near.min():  # once or, as logarithms round, twice
                 radius *= self.lambda_growth
         candidates = allowed[near < radius]
         if len(candidates) == 0:

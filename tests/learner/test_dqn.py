@@ -101,11 +101,12 @@ def sampler(model, batches, q_values):
         ((16, 12), 1.0, {"tau": 0.3, "activation": "tanh"}),
         ((16, 12), 1.0, {"n_steps": 4}),
         ((16,), 1.0, {"n_steps": 3, "buffer_size": 400}),
+        ((16,), 1.0, {"tau": 0.05, "target_update_interval": 1}),
     ],
 )
 def test_gradient_steps_are_those_of_stable_baselines(twin, flat, random_games, monkeypatch, network, scale, changes):
     dqn = replace(SMALL, network=network, buffer_size=600, batch_size=32)
-    dqn = replace(dqn, learning_starts=100, target_update_interval=200, **changes)
+    dqn = replace(dqn, learning_starts=100, **({"target_update_interval": 200} | changes))
     state = grown(dqn, 2)
     games = random_games([[4, 8, 3, 5]] * 5, [120, 80, 100, 99, 103], [True, False, True, False, True])
     games.rewards[:] *= scale
@@ -161,10 +162,11 @@ def test_schedule_by_hand():
     # Learning at 24, 28, ..., 48, a target at 30 and one at 45, and one at 50 after the last learning.
     count, renewals = schedule(10, 50, 4, 1, 20, 15)
     assert count == 7
-    assert renewals.tolist() == [True, False, True, False, False, False, True, False]
+    assert renewals.tolist() == [1, 0, 1, 0, 0, 0, 1, 0]
     count, renewals = schedule(46, 51, 4, 3, 20, 50)
     assert count == 3  # at 48, three times
-    assert renewals.tolist() == [False, False, False, True]
+    assert renewals.tolist() == [0, 0, 0, 1]
+    assert schedule(16, 27, 4, 1, 0, 2)[1].tolist() == [2, 2, 1]  # at 18 and 20, then 22 and 24, then 26
     assert schedule(0, 20, 4, 1, 20, 100)[0] == 0  # not before more than learning_starts steps
     assert schedule(0, 23, 4, 1, 20, 100)[0] == 0
     assert schedule(0, 24, 4, 1, 20, 100)[0] == 1

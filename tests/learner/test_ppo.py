@@ -207,7 +207,9 @@ def test_too_few_steps_are_kept_for_later(random_games):
 def test_what_a_member_learns_does_not_depend_on_the_others(random_games):
     games = random_games([[0, 1, 2, 1]] * 3, LENGTHS, TERMINATED)
     island, alone = grown(SMALL, 3), grown(SMALL, 3)
-    alone = type(alone)(*(type(each)(*(c[:1] for c in each)) for each in alone[:2]), alone.filled[:1])
+    alone = type(alone)(
+        *(type(each)(*(c[:1] for c in each)) for each in alone[:2]), alone.filled[:1], alone.collected[:1]
+    )
     SMALL.learn(island, games, 0, np.random.default_rng(5), Workers(2))
     SMALL.learn(alone, games, 0, np.random.default_rng(5), Workers(1))
     for name, tensor in SMALL.tensors(alone).items():

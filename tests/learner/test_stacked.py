@@ -23,6 +23,7 @@ SETTINGS = [
     DQN,
     replace(DQN, tau=0.3, activation="tanh", gradient_steps=-1),
     replace(DQN, n_steps=4, max_grad_norm=0.05),
+    replace(DQN, tau=0.05, target_update_interval=1),
 ]
 
 

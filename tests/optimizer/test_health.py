@@ -1,7 +1,7 @@
 """Members whose weights are no numbers any more are caught, and the run goes on."""
 
 import logging
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ import torch
 from berteam_cli.learner.dqn import Dqn
 from berteam_cli.learner.ppo import Ppo
 from berteam_cli.learner.sb3 import Sb3
+from berteam_cli.learner.stacked_dqn import StackedDqn
 from berteam_cli.optimizer.coevolution import Coevolution
 from berteam_cli.outcomes import Experience
 from berteam_cli.population import Island, founded
@@ -33,7 +34,9 @@ SB3 = [
     for algorithm, options in (
         ("PPO", {"n_steps": 8, "batch_size": 4}),
         ("A2C", {}),
+        ("TRPO", {"n_steps": 8, "batch_size": 4}),
         ("DQN", {"buffer_size": 100, "learning_starts": 0}),
+        ("QRDQN", {"buffer_size": 100, "learning_starts": 0}),
     )
 ]
 
@@ -88,6 +91,18 @@ def test_a_sick_member_is_undone_once_and_then_replaced_by_the_fittest(learner, 
     people, learnt, _ = trained(optimizer, people, 3)
     assert learnt[1].updates > 0
     assert learnt[1].failures == 0
+
+
+@pytest.mark.parametrize("kind", [Dqn, StackedDqn])
+def test_the_target_is_renewed_in_time_even_where_learning_is_undone(kind):
+    stacked = {"device": "cpu"} if kind is StackedDqn else {}
+    optimizer, people = optimizer_and_population(kind(**asdict(replace(DQN, target_update_interval=8)), **stacked))
+    mind = people.minds[0]
+    mind.trained.weights[:] = 3e38
+    mind.target[:] = 0.0
+    people, learnt, _ = trained(optimizer, people, 1)
+    assert [learnt[row].failures for row in range(4)] == [1, 1, 1, 1]
+    assert (mind.target == mind.trained.weights).all()
 
 
 def test_the_parent_comes_before_the_fittest_unless_it_is_sick_too():
