@@ -25,7 +25,7 @@ def test_on_the_processor_members_learn_in_compiled_functions_and_on_a_gpu_stack
     assert learners("device=cuda") == learners("device=auto") == [StackedPpo, StackedPpo, StackedDqn, StackedDqn]
     assert learners("device=cpu") == [Ppo, Ppo, Dqn, Dqn]
     assert learners("device=cuda", "population=ppo6", "learner=sb3") == [Sb3]
-    with pytest.raises(InputError, match="dqn96.learner.buffer_size must be <= .* may take 1.0 GiB of 2.0 GiB"):
+    with pytest.raises(InputError, match=r"dqn96.learner.buffer_size must be <= .* may take 1.0 GiB of 2.0 GiB"):
         learners("device=cuda", "population.islands.dqn96.learner.buffer_size=200000")
     parts = build.parts(checked(composed("device=cuda")))
     assert {x.learner.device for x in parts.optimizer.islands} == {"cuda"} == {parts.selector.device}
