@@ -199,7 +199,7 @@ def resume(word: str, words: list[str]) -> None:
         word,
         words,
         run={"type": Path, "help": "folder of the run"},
-        overrides={"nargs": "*", "help": "epochs=N, workers=N, ..."},
+        overrides={"nargs": "*", "help": "epochs=N, workers=N, checkpoint_every=N, evaluation.games=N"},
     )
     from berteam_cli.command.resume import resume as go_on  # noqa: PLC0415
 

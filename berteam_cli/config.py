@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import MISSING, DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from berteam_cli.errors import InputError
+from berteam_cli.errors import InputError, did_you_mean
 
 LIMIT = 10**9  # above any size a run can have
 
@@ -405,6 +406,12 @@ def one_line(error: OmegaConfBaseException) -> str:
     """Returns what OmegaConf objects to, with the key, in one line."""
     said = str(error).splitlines()[0].rstrip(".")
     key = getattr(error, "full_key", None)
+    if key and (unknown := re.fullmatch(r"Key '(.*)' not in '(\w+)'", said)):
+        known = [item.name for item in fields(globals()[unknown[2]])]
+        near = did_you_mean(unknown[1], known)
+        return f"{key} is no key here; there are {', '.join(known)}.{near}"
+    if key and "missing mandatory value" in said:
+        return f"{key} must be given."
     return f"{key}: {said}." if key else f"{said}."
 
 
@@ -431,5 +438,5 @@ def check_bounds(value: Any, key: str) -> None:
             low, high, open_low = (item.metadata[x] for x in ("low", "high", "open_low"))
             if not (low < given if open_low else low <= given) or not given <= high or not math.isfinite(given):
                 above = f"> {low:g}" if open_low else f">= {low:g}"
-                below = f" and <= {high:g}" if high != LIMIT else ""
+                below = f" and <= {high:g}" if high != LIMIT or given > high else ""
                 raise InputError(f"{path} must be {above}{below}, but is {given}.")

@@ -129,18 +129,23 @@ class Manifest:
             KeyboardInterrupt: it was interrupted.
         """
         (self.folder / ERROR).unlink(missing_ok=True)
-        go_on = f"Go on with: berteam resume {self.folder}" if resumable else "Begin anew with on_exists=overwrite."
+
+        def go_on() -> str:
+            if resumable and any((self.folder / "checkpoint").glob("epoch_*")):
+                return f"Go on with: berteam resume {self.folder}"
+            return "Begin anew with on_exists=overwrite."
+
         try:
             yield
         except KeyboardInterrupt:
             self.add(status="interrupted", ended=now())
-            log.info("Interrupted. %s", go_on)
+            log.info("Interrupted. %s", go_on())
             raise
         except Exception as error:
             (self.folder / ERROR).write_text(traceback.format_exc(), encoding="utf-8")
             self.add(status="failed", ended=now())
             raise RunError(
-                f"The run failed: {type(error).__name__}: {error} (traceback in {self.folder / ERROR}). {go_on}"
+                f"The run failed: {type(error).__name__}: {error} (traceback in {self.folder / ERROR}). {go_on()}"
             ) from error
         self.add(status="done", ended=now())
 

@@ -66,7 +66,7 @@ def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) ->
     if not islands:
         raise InputError(
             "population must have members, but has none: name islands in population.islands, "
-            "or files in population.members=[{file: agent.zip}]."
+            "or files in 'population.members=[{file: agent.zip}]'."
         )
     return tuple(islands)
 
@@ -133,6 +133,8 @@ def learner(config: LearnerConfig, game: Env, key: str, device: str) -> Learner[
     Raises:
         InputError: its settings do not go together.
     """
+    if type(config) is LearnerConfig:
+        raise InputError(f"{key} must be one of {', '.join(LEARNERS)}: a population's yaml chooses it in its defaults.")
     settings = asdict(config)
     name = settings.pop("name")
     network = settings.pop("network")

@@ -96,5 +96,8 @@ def fits_there(islands: list[Island], played: int, games: int, limit: int, whole
         most = 1 + (limit - (total - takes) - one) // (two - one)
     name = f"population.islands.{largest.name}"
     if most < 1:
-        raise InputError(f"{name}.size is {largest.size}, too many members of {spoken(takes)} together: {said}.")
+        smaller = "" if key else " or too large buffers, which learner.options.n_steps or buffer_size says"
+        raise InputError(
+            f"{name}.size={largest.size} is too many members of {spoken(takes)} together{smaller}: {said}."
+        )
     raise InputError(f"{name}.learner.{key} must be <= {most}, but is {getattr(learner, key)}: {said}.")

@@ -119,7 +119,12 @@ def policy_settings(learner: Ppo | Dqn) -> dict[str, Any]:
 
 def own_model(learner: Learner[Any], state: list[BaseAlgorithm], row: int, space: Box) -> BaseAlgorithm:
     """Returns the model that a member of ``sb3`` is."""
-    return state[row]
+    from berteam_cli.learner.sb3_feeding import exploration  # noqa: PLC0415 (loaded already where there is one)
+
+    model = state[row]
+    if hasattr(model, "exploration_rate"):
+        model.exploration_rate = exploration(model, learner.schedule_steps)  # type: ignore[attr-defined]
+    return model
 
 
 EXPORTERS: dict[str, Callable[[Any, Any, int, Box], BaseAlgorithm]] = {"ppo": ppo, "dqn": dqn}

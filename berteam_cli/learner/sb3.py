@@ -57,17 +57,21 @@ class Sb3:
         """
         check_options(algorithm_class(self.algorithm), self.options)
         try:
-            self.init(1, np.random.default_rng(0))
+            with drawing_from(np.random.default_rng(0)):
+                self.model()
         except (AssertionError, ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError) as error:
             why = str(error).splitlines()[0].rstrip(".")
             raise ValueError(f"options cannot be used, as {self.algorithm} says: {why}.") from error
 
     def init(self, members: int, rng: Generator) -> list[BaseAlgorithm]:
-        """Returns the models of ``members`` members that have not learnt yet."""
+        """Returns the models of ``members`` members that have not learnt yet; all their memory is taken now."""
         models = []
         for alone in rng.spawn(members):
             with drawing_from(alone):
                 models.append(self.model())
+            buffer, columns = buffer_of(models[-1])
+            for name in columns:
+                getattr(buffer, name).fill(0)
         return models
 
     def model(self) -> BaseAlgorithm:
@@ -132,7 +136,8 @@ class Sb3:
 
     def state_bytes(self, members: int) -> int:
         """Returns the bytes of the models' weights, of what the optimizer remembers and of full buffers."""
-        (model,) = self.init(1, np.random.default_rng(0))
+        with drawing_from(np.random.default_rng(0)):
+            model = self.model()
         buffer, columns = buffer_of(model)
         weights = sum(x.numel() * x.element_size() for x in model.policy.state_dict().values())
         return members * (3 * weights + sum(getattr(buffer, name).nbytes for name in columns))

@@ -76,7 +76,10 @@ class Coevolution(Fixed):
         replaced = []
         for island, i, member in failed:
             able = np.flatnonzero(population.failed[island.members] == 0) + island.first
-            if population.failed[member] < HOPELESS or len(able) == 0:
+            if population.failed[member] < HOPELESS:
+                continue
+            if len(able) == 0:
+                log.warning("Nobody of island %s can learn any more: its settings do not work.", island.name)
                 continue
             parent = int(population.parent[member])
             if parent not in able:

@@ -210,6 +210,31 @@ def test_a_folder_of_ones_own_choices(berteam, tmp_path):
     assert set(read(tmp_path / "run", "agents").agent) == {0, 1}
 
 
+def test_an_island_without_a_learner_is_told_where_one_is_chosen(berteam, tmp_path):
+    mine = tmp_path / "mine" / "population"
+    mine.mkdir(parents=True)
+    for name, learner in (("bare", "{name: ppo}"), ("odd", "{name: ppo, n_steps: 64}")):
+        text = (
+            f"defaults: [/schema/population/islands@_here_, _self_]\nislands: {{main: {{size: 2, learner: {learner}}}}}"
+        )
+        (mine / f"{name}.yaml").write_text(text)
+    words = ["train", "--config-dir", "mine", "env=rps", "out=run"]
+    said = berteam(*words, "population=bare", code=2).stderr
+    assert "population.islands.main.learner must be one of ppo, dqn, sb3: a population's yaml chooses it" in said
+    assert "learner.n_steps is no key here; there are name." in berteam(*words, "population=odd", code=2).stderr
+
+
+def test_a_run_that_ends_before_its_first_checkpoint_does_not_promise_to_go_on(berteam, tmp_path, monkeypatch):
+    from berteam_cli.command import train  # noqa: PLC0415
+
+    def interrupted(parts):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(train, "begin", interrupted)
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "out=run"]
+    assert "Interrupted. Begin anew with on_exists=overwrite." in berteam(*words, code=130).stdout
+
+
 def test_a_run_killed_at_once_goes_on(tmp_path, process):
     """Before its first regular checkpoint, and without a chance to say good-bye."""
     words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "record_every=100"]
