@@ -139,7 +139,7 @@ def test_advantages_by_hand():
         ((16,), {"minibatch_size": 60, "normalize_advantage": False, "clip_range": 0.05}),
         ((16, 12), {"minibatch_size": 255, "max_grad_norm": 1e-3}),
         ((16, 12), {"activation": "relu", "clip_range_vf": 0.1}),
-        ((16, 12), {"target_kl": 0.001}),
+        *(((16, 12), {"target_kl": limit}) for limit in (0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004)),
     ],
 )
 def test_an_update_is_that_of_stable_baselines(twin, flat, random_games, monkeypatch, network, changes):

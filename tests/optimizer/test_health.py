@@ -93,6 +93,19 @@ def test_a_sick_member_is_undone_once_and_then_replaced_by_the_fittest(learner, 
     assert learnt[1].failures == 0
 
 
+def test_whose_policy_changed_is_to_be_measured_again():
+    optimizer, people = optimizer_and_population(PPO)
+    people.stale[:] = False
+    half = games(1)
+    half.members[:] = [[0, 9, 2, 9]]  # 1 and 3 do not play
+    half.lengths[:] = 5  # too few steps to learn from
+    people, _, _ = optimizer.train(people, half, np.random.default_rng(1))
+    np.testing.assert_array_equal(people.stale, False)
+    half.lengths[:] = 8
+    people, _, _ = optimizer.train(people, half, np.random.default_rng(2))
+    np.testing.assert_array_equal(people.stale, [True, False, True, False])
+
+
 @pytest.mark.parametrize("kind", [Dqn, StackedDqn])
 def test_the_target_is_renewed_in_time_even_where_learning_is_undone(kind):
     stacked = {"device": "cpu"} if kind is StackedDqn else {}

@@ -53,6 +53,13 @@ def test_an_island_of_loners_is_skipped():
     assert replaced == []
 
 
+def test_exactly_at_the_radius_is_unique():
+    places = islands(2)
+    people = measured(places, 0.0, [1.0, 2.0])
+    assert mapelites(places, elites=0).renew(people, np.random.default_rng(0))[1] == []
+    assert mapelites(places, elites=0, radius=1.001).renew(people, np.random.default_rng(0))[1] != []
+
+
 def test_only_the_crowd_competes():
     # 0 and 1 are alike; 2 is far away and the least fit of all, and stays. 3 leads.
     places = islands(4)
