@@ -26,7 +26,7 @@ MEMBERS = "members"  # the island of members from files
 NO_NAMES = {"na", "nan", "null", "none", "n-a", "other"}  # pandas reads most of these as nothing
 
 
-def sb3(*, device: str = "cpu", **settings: Any) -> Learner[Any]:
+def sb3(**settings: Any) -> Learner[Any]:
     """Returns a learner of Stable-Baselines3, on the processor; that library takes seconds to load, and only here."""
     from berteam_cli.learner.sb3 import Sb3  # noqa: PLC0415
 
@@ -34,7 +34,7 @@ def sb3(*, device: str = "cpu", **settings: Any) -> Learner[Any]:
 
 
 LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": Ppo, "dqn": Dqn, "sb3": sb3}
-STACKED_LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": StackedPpo, "dqn": StackedDqn, "sb3": sb3}
+STACKED_LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": StackedPpo, "dqn": StackedDqn}
 
 
 def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) -> tuple[Island, ...]:
@@ -128,7 +128,7 @@ def learner(config: LearnerConfig, game: Env, key: str, device: str) -> Learner[
         config: its settings.
         game: what it learns.
         key: of its settings, for messages.
-        device: "cpu", where compiled functions learn, or "cuda", where torch does.
+        device: "cpu", where compiled functions learn, or "cuda", where torch does for the learners that can.
 
     Raises:
         InputError: its settings do not go together.
@@ -141,9 +141,9 @@ def learner(config: LearnerConfig, game: Env, key: str, device: str) -> Learner[
     if not 1 <= len(network) <= 6 or not all(1 <= width <= 4096 for width in network):
         raise InputError(f"{key}.network must be 1 to 6 widths from 1 to 4096, but is {network}.")
     check_settings(settings, key)
-    if device != "cpu":
-        settings["device"] = device
-    made = (LEARNERS if device == "cpu" else STACKED_LEARNERS)[name]
+    made = LEARNERS[name]
+    if device != "cpu" and name in STACKED_LEARNERS:
+        made, settings["device"] = STACKED_LEARNERS[name], device
     try:
         return made(
             observation_size=game.observation_size,

@@ -36,11 +36,6 @@ def spoken(size: float) -> str:
     return f"{size / 2**20:,.0f} MiB" if size < 2**30 else f"{size / 2**30:,.1f} GiB"
 
 
-def needed(islands: tuple[Island, ...], env: Env, games: int) -> tuple[int, int]:
-    """Returns the bytes that the members take, weights and buffers, and those of trajectories of ``games`` games."""
-    return sum(state_bytes(island) for island in islands), trajectory_bytes(env, games)
-
-
 def state_bytes(island: Island) -> int:
     """Returns the bytes that the members of ``island`` take."""
     return island.learner.state_bytes(island.size)

@@ -13,7 +13,7 @@ from berteam_cli.config import TrainConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder
-from berteam_cli.memory import needed, spoken
+from berteam_cli.memory import spoken, state_bytes
 from berteam_cli.pace import Pace
 from berteam_cli.recording import Recorder
 from berteam_cli.records import Tables
@@ -46,9 +46,8 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
     write_config(folder, text)
     with logging_to(folder):
         log.info("%s", folder)
-        state, played = needed(
-            parts.optimizer.islands, parts.games.env, config.games_per_epoch * (parts.room is not None)
-        )
+        state = sum(state_bytes(island) for island in parts.optimizer.islands)
+        played = sum(column.nbytes for column in parts.room or ())
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
         manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
         with manifest.until_the_end(), stoppable() as stop:

@@ -15,7 +15,7 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, layers, uniform, weight_count
 from berteam_cli.learner.replay import Replay, empty, remember
-from berteam_cli.learner.temporal import Difference, follow, learn_steps, schedule
+from berteam_cli.learner.temporal import FIGURES, Difference, follow, learn_steps, schedule
 from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
@@ -152,12 +152,12 @@ class Dqn:
         count, renewals = self.plan(before, after)
         batches = self.batches(after, count, rng)
         columns = (*state.trained, state.target)
-        figures = guarded(columns, row, 2, lambda: self.steps_taken(state, row, batches, renewals))
+        figures = guarded(columns, row, len(FIGURES), lambda: self.steps_taken(state, row, batches, renewals))
         learning = Learning(row, epsilon=float(self.epsilon(state.collected[row])), steps=after - before)
         if figures is None:  # what is undone does not delay the target
             follow(state.target[row], state.trained.weights[row], self.tau, int(renewals.sum()))
             return replace(learning, failures=1)
-        means = dict(zip(("loss", "q_value"), figures.tolist(), strict=True)) if count else {}
+        means = dict(zip(FIGURES, figures.tolist(), strict=True)) if count else {}
         return replace(learning, updates=count, **means)
 
     def plan(self, before: int, after: int) -> tuple[int, Ints]:

@@ -6,6 +6,7 @@ import random
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -136,11 +137,16 @@ class Sb3:
 
     def state_bytes(self, members: int) -> int:
         """Returns the bytes of the models' weights, of what the optimizer remembers and of full buffers."""
+        return members * self._member_bytes
+
+    @cached_property
+    def _member_bytes(self) -> int:
+        """The bytes of one model; to know them takes building it."""
         with drawing_from(np.random.default_rng(0)):
             model = self.model()
         buffer, columns = buffer_of(model)
         weights = sum(x.numel() * x.element_size() for x in model.policy.state_dict().values())
-        return members * (3 * weights + sum(getattr(buffer, name).nbytes for name in columns))
+        return 3 * weights + sum(getattr(buffer, name).nbytes for name in columns)
 
     def copy(self, state: list[BaseAlgorithm], child: int, parent: int) -> None:
         """Makes ``child`` know what ``parent`` does, with its replay buffer; an actor's rollout is its own."""

@@ -7,6 +7,7 @@ Adam are its own. ``mlp`` and ``adam`` say the same one member at a time.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -14,6 +15,8 @@ from torch import Tensor
 
 from berteam_cli.learner.adam import MEAN_DECAY, SQUARE_DECAY, Adam, Trained
 from berteam_cli.learner.mlp import layers
+
+S = TypeVar("S", bound=Any)  # a NamedTuple with a field ``trained``
 
 
 def outputs(weights: Tensor, sizes: tuple[int, ...], smooth: bool, x: Tensor) -> Tensor:
@@ -54,6 +57,11 @@ def descend(adam: Adam, trained: Trained, gradient: Tensor, active: Tensor) -> N
     mean.copy_(new_mean)
     square.copy_(new_square)
     weights -= torch.where(moves, rate * mean / (square.sqrt() / root + adam.epsilon), 0.0)
+
+
+def acting(state: S) -> S:
+    """Returns ``state``, of a stacked learner, with its weights on the processor, where games are played."""
+    return state._replace(trained=state.trained._replace(weights=state.trained.weights.cpu().numpy()))
 
 
 def taken(columns: Sequence[Tensor], rows: Tensor) -> list[Tensor]:

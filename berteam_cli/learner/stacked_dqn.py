@@ -16,7 +16,8 @@ from berteam_cli.learner.adam import Trained
 from berteam_cli.learner.base import Learning
 from berteam_cli.learner.dqn import Dqn, DqnState
 from berteam_cli.learner.replay import Replay, latest
-from berteam_cli.learner.stacked import descend, on, outputs, put_where_finite, taken
+from berteam_cli.learner.stacked import acting, descend, on, outputs, put_where_finite, taken
+from berteam_cli.learner.temporal import FIGURES
 from berteam_cli.outcomes import Experience, Ints
 from berteam_cli.workers import Workers
 
@@ -37,8 +38,7 @@ class StackedDqn(Dqn):
 
     def policies(self, state: DqnState, *, explore: bool) -> Policies:
         """Returns the members' greedy policies, which err at random as their schedules say if they ``explore``."""
-        weights = state.trained.weights.cpu().numpy()
-        return super().policies(state._replace(trained=state.trained._replace(weights=weights)), explore=explore)
+        return super().policies(acting(state), explore=explore)
 
     def learn(
         self, state: DqnState, experience: Experience, first: int, rng: Generator, workers: Workers
@@ -67,7 +67,7 @@ class StackedDqn(Dqn):
         figures, sound = self.stepped(state, rows, batches, [renewals for _, renewals in plans])
         learnt = []
         for row, (count, _), numbers, well in zip(rows, plans, figures, sound, strict=True):
-            means = dict(zip(("loss", "q_value"), numbers, strict=True)) if count and well else {}
+            means = dict(zip(FIGURES, numbers, strict=True)) if count and well else {}
             steps, epsilon = int(state.collected[row] - before[row]), float(self.epsilon(state.collected[row]))
             learnt.append(Learning(row, count * well, **means, epsilon=epsilon, steps=steps, failures=int(not well)))
         return learnt
@@ -96,7 +96,7 @@ class StackedDqn(Dqn):
         newest = on(self.device, (state.collected[rows] - 1) % self.buffer_size)
         trained = Trained(*taken(state.trained, chosen))
         target = state.target[chosen]
-        sums = torch.zeros(len(rows), 2, dtype=torch.float64, device=self.device)
+        sums = torch.zeros(len(rows), len(FIGURES), dtype=torch.float64, device=self.device)
         places, renewing = on(self.device, at), on(self.device, renews)
         for step in range(most + 1):
             target = self.followed(target, trained.weights, renewing[:, step])

@@ -16,7 +16,7 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.mlp import weight_count
 from berteam_cli.learner.ppo import Ppo, PpoState, learning
 from berteam_cli.learner.rollout import Seen, Steps, advantages, append, seen, stitched
-from berteam_cli.learner.stacked import descend, on, outputs, put_where_finite, taken
+from berteam_cli.learner.stacked import acting, descend, on, outputs, put_where_finite, taken
 from berteam_cli.learner.surrogate import FIGURES, KL, LOSSES, Sample
 from berteam_cli.outcomes import Experience
 from berteam_cli.workers import Workers
@@ -38,8 +38,7 @@ class StackedPpo(Ppo):
 
     def policies(self, state: PpoState, *, explore: bool) -> Policies:
         """Returns the members' stochastic policies."""
-        weights = state.trained.weights.cpu().numpy()
-        return super().policies(state._replace(trained=state.trained._replace(weights=weights)), explore=explore)
+        return super().policies(acting(state), explore=explore)
 
     def learn(
         self, state: PpoState, experience: Experience, first: int, rng: Generator, workers: Workers

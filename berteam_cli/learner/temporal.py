@@ -39,6 +39,9 @@ def schedule(
     return len(learnings), np.diff(times // target_update_interval)
 
 
+FIGURES = ("loss", "q_value")
+
+
 class Difference(NamedTuple):
     """Settings of the temporal difference.
 
@@ -67,7 +70,7 @@ def learn_steps(
     batches: Ints,
     renewals: Ints,
 ) -> Floats:
-    """Takes gradient steps on the smooth absolute error of Q; returns the means of loss and of Q.
+    """Takes gradient steps on the smooth absolute error of Q; returns (len(FIGURES),) means.
 
     Args:
         difference: settings of the error.
@@ -85,7 +88,7 @@ def learn_steps(
     values = np.empty(n_values(sizes, n), np.float32)
     slope = np.empty((n, sizes[-1]), np.float32)
     goals, discounts, last = np.empty(n, np.float32), np.empty(n, np.float32), np.empty(n, np.int64)
-    figures = np.zeros(2)
+    figures = np.zeros(len(FIGURES))
     for k in range(steps):
         follow(target, member.weights, difference.tau, renewals[k])
         at = batches[k]

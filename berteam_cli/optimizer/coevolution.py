@@ -69,15 +69,16 @@ class Coevolution(Fixed):
         such updates came twice in a row, it becomes a copy of who is on its parent's place, or of the fittest of its
         island.
         """
-        failed = [(self.islands[i], i, self.islands[i].first + x.row) for i, x in learnt if x.failures]
+        failed = [(i, self.islands[i].first + x.row) for i, x in learnt if x.failures]
         if failed:
-            who = ", ".join(str(member) for _, _, member in failed)
+            who = ", ".join(str(member) for _, member in failed)
             log.warning("Updates gave weights or a loss that are not finite, and were undone; of members: %s.", who)
         replaced = []
-        for island, i, member in failed:
-            able = np.flatnonzero(population.failed[island.members] == 0) + island.first
+        for i, member in failed:
             if population.failed[member] < HOPELESS:
                 continue
+            island = self.islands[i]
+            able = np.flatnonzero(population.failed[island.members] == 0) + island.first
             if len(able) == 0:
                 log.warning("Nobody of island %s can learn any more: its settings do not work.", island.name)
                 continue
