@@ -28,9 +28,11 @@ from berteam_cli.optimizer.mapelites import MapElites
 from berteam_cli.population import Island, island_of
 from berteam_cli.selector.base import Field, Selector
 from berteam_cli.selector.berteam import Berteam
+from berteam_cli.selector.constraints import allowed
 from berteam_cli.selector.mcaa import Mcaa
+from berteam_cli.selector.observations import looking
 from berteam_cli.selector.uniform import Uniform
-from berteam_cli.training import Parts
+from berteam_cli.training import Parts, rounds
 from berteam_cli.workers import Workers, available_cores
 
 ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps, "pettingzoo": Pettingzoo}
@@ -76,16 +78,22 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
         raise InputError(
             f"team_size must be at most {members}, the members of the population, but is {config.team_size}."
         )
-    field = Field(island_of(islands), config.team_size)
     improving = optimizer(config, islands, playing)
-    games_kept = config.games_per_epoch if improving.learns and not read_only else 0
+    selecting = selector(config, field_of(config, islands, playing.env), playing.env, device)
+    if selecting.answers and config.games_per_epoch % 2:
+        raise InputError(
+            "games_per_epoch must be even with selector.observations=previous_game, which plays every opponent twice, "
+            f"but is {config.games_per_epoch}."
+        )
+    watched = improving.learns or selecting.observes
+    games_kept = config.games_per_epoch // rounds(selecting) if watched and not read_only else 0
     if not read_only:
         check_memory(islands, playing.env, games_kept)
     return Parts(
         seed=config.seed,
         games_per_epoch=config.games_per_epoch,
         games=playing,
-        selector=selector(config, field, device),
+        selector=selecting,
         optimizer=improving,
         room=blank_trajectories(playing.env, games_kept) if games_kept else None,
     )
@@ -108,17 +116,35 @@ def chosen_device(name: str) -> str:
     return "cuda" if there and name != "cpu" else "cpu"
 
 
-def selector(config: TrainConfig, field: Field, device: str) -> Selector[Any]:
+def field_of(config: TrainConfig, islands: tuple[Island, ...], game: Env) -> Field:
+    """Returns among whom the selector chooses.
+
+    Raises:
+        InputError: selector.valid_members cannot be.
+    """
+    owners, places = island_of(islands), config.selector.valid_members
+    try:
+        valid = None
+        if places is not None:
+            valid = allowed(places, [island.name for island in islands], owners, config.team_size)
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    return Field(owners, config.team_size, valid=valid, exact_limit=config.selector.exact_limit)
+
+
+def selector(config: TrainConfig, field: Field, game: Env, device: str) -> Selector[Any]:
     """Returns the selector.
 
     Raises:
         InputError: its settings do not go together.
     """
     settings = asdict(config.selector)
-    settings.pop("fitness")
+    for used in ("fitness", "exact_limit", "valid_members"):
+        settings.pop(used)
     name = settings.pop("name")
     if name == "berteam":
         settings["device"] = device
+        settings["observations"] = looking(settings["observations"], game)
     try:
         return SELECTORS[name](field=field, **settings)
     except ValueError as error:

@@ -78,9 +78,10 @@ def composed(word: str, words: list[str]) -> None:
     """Runs a command whose config Hydra composes."""
     import hydra  # noqa: PLC0415 (start-up: each command imports what it needs)
 
-    from berteam_cli.compose import arguments, check, help_text, prepare  # noqa: PLC0415
+    from berteam_cli.compose import arguments, check, help_text, prepare, spelt_out  # noqa: PLC0415
 
     prepare()
+    words = spelt_out(words)
     Sweeps.failed, Sweeps.table = 0, None
     given = arguments(words)
     if given.help:

@@ -108,6 +108,19 @@ def parsed(overrides: list[str]) -> list[Override]:
     return read
 
 
+SHORT = {"selector.observations": "selector.observations.use"}
+"""What may be said for a longer key: a part of the config stands for the one of its values that decides all others."""
+
+
+def spelt_out(words: list[str]) -> list[str]:
+    """Returns the words of a command line with SHORT keys replaced by the keys they stand for."""
+    spelt = []
+    for word in words:
+        key, equals, value = word.partition("=")
+        spelt.append(f"{SHORT.get(key, key)}={value}" if equals and not value.startswith("{") else word)
+    return spelt
+
+
 def jobs(overrides: list[Override], *, sweep: bool) -> Iterator[list[Override]]:
     """Yields lists of overrides in which every value of every sweep occurs once, the others at their first."""
     plain = [x for x in overrides if not (sweep and x.is_sweep_override())]

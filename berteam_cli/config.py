@@ -131,6 +131,8 @@ class SelectorConfig:
 
     name: str = MISSING
     fitness: str = choice("elo", "moving_average")
+    exact_limit: int = number(1)
+    valid_members: Any = MISSING  # a list for each place; OmegaConf takes no words beside numbers in it
 
 
 @dataclass
@@ -146,6 +148,18 @@ class McaaConfig(SelectorConfig):
 
     learning_rate: float = number(open_low=True)
     train_every: int = number(1)
+
+
+@dataclass
+class ObservationsConfig:
+    """What of the opponent BERTeam knows before it chooses; selector/observations.py."""
+
+    use: str = choice("none", "self", "previous_game")
+    stride: int = number(1)
+    drop_input: float = number(0, 1)
+    drop_player: float = number(0, 1)
+    embed: str = choice("lstm", "mean", "attention")
+    lstm_layers: int = number(1, 64)
 
 
 @dataclass
@@ -168,6 +182,9 @@ class BerteamConfig(SelectorConfig):
     heads: int = number(1, 1024)
     dropout: float = number(0, 0.99)
     position: str = choice("append", "add", "none")
+    side: str = choice("shared", "token", "separate")
+    dataset: str = choice("shared", "per_side")
+    observations: ObservationsConfig = MISSING
 
 
 @dataclass
@@ -335,7 +352,6 @@ class TrainConfig(CommandConfig):
     games_per_epoch: int = number(1)
     device: str = choice("cpu", "cuda", "auto")
     record_every: int = number(1)
-    record_teams: int = number(1)
     checkpoint_every: int = number(1)
     selector: SelectorConfig = MISSING
     optimizer: OptimizerConfig = MISSING

@@ -8,7 +8,8 @@ Side 0 is blue, side 1 is red.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -65,6 +66,11 @@ class Outcomes:
         """(K, T) teams that won, games in order; a draw has none."""
         return self.lineups.teams[self.scores == 1.0]
 
+    def followed_by(self, later: Outcomes) -> Outcomes:
+        """Returns these games and then those of ``later``."""
+        lineups = Lineups(*joined_fields(self.lineups, later.lineups))
+        return Outcomes(lineups, *joined_fields(self, later)[1:])
+
     def event(self, name: str) -> Ints:
         """Returns (B, S) how often ``name``, one of EVENTS, happened to each side."""
         return self.events[:, :, EVENTS.index(name)]
@@ -92,6 +98,10 @@ class Experience:
     lengths: Ints
     terminated: Bools
 
+    def followed_by(self, later: Experience) -> Experience:
+        """Returns that of these games and then that of ``later``."""
+        return Experience(*joined_fields(self, later))
+
     def trajectories(self, first: int, size: int) -> dict[int, list[tuple[int, int]]]:
         """Returns (game, player) of each trajectory, in order, of every member that played.
 
@@ -108,3 +118,9 @@ class Experience:
         for k in order:
             played.setdefault(int(row[k]), []).append((int(game[k]), int(player[k])))
         return played
+
+
+def joined_fields(first: Any, second: Any) -> list[Any]:
+    """Returns the arrays of two records of one kind, one behind the other; fields that hold no array come as None."""
+    pairs = ((getattr(first, x.name), getattr(second, x.name)) for x in fields(first))
+    return [np.concatenate(pair) if isinstance(pair[0], np.ndarray) else None for pair in pairs]

@@ -27,13 +27,11 @@ class Recorder:
         tables: of the run folder.
         parts: of the run.
         every: epochs between two records of members and distributions.
-        most_teams: above so many possible teams their distribution is sampled.
     """
 
     tables: Tables
     parts: Parts
     every: int
-    most_teams: int
 
     def epoch(self, run: Run, report: Report) -> None:
         """Records an epoch, and after every ``every``-th one the state it led to."""
@@ -56,7 +54,7 @@ class Recorder:
     def distribution(self, run: Run) -> TeamDistribution:
         """Returns the distribution over teams after ``run.epoch`` epochs."""
         rng = generator(self.parts.seed, RECORDS, run.epoch)
-        return measured(self.parts.selector, run.selection, self.most_teams, rng)
+        return measured(self.parts.selector, run.selection, rng)
 
     def last(self, run: Run) -> None:
         """Records the state after the last epoch, unless that is done."""
@@ -67,10 +65,7 @@ class Recorder:
         """Records the members and the distributions over teams, captains and islands; returns that over teams."""
         distribution = self.distribution(run)
         self.tables.add("agents", self.agent_rows(run))
-        rows = [(run.epoch, *row) for row in zip(team_names(distribution.teams), distribution.probability, strict=True)]
-        if distribution.samples:
-            rows.append((run.epoch, "other", distribution.other))
-        self.tables.add("team_distribution", rows)
+        self.tables.add("team_distribution", distribution_rows(run.epoch, distribution))
         captains = self.parts.selector.captains(run.selection)
         self.tables.add("captain_distribution", ((run.epoch, n, chance) for n, chance in enumerate(captains)))
         islands = self.parts.optimizer.islands
@@ -107,6 +102,16 @@ class Recorder:
                 *(run.epoch, name, x.removed, x.parent, x.removed_fitness, x.parent_fitness),
                 *(x.removed_age, x.reason),
             )
+
+
+def distribution_rows(epoch: int, distribution: TeamDistribution) -> Iterator[Row]:
+    """Returns one row for each listed team, and one for all others of a sampled distribution."""
+    listed = len(distribution.teams)
+    errors = np.zeros(listed) if distribution.error is None else distribution.error
+    for team, chance, error in zip(team_names(distribution.teams), distribution.probability, errors, strict=True):
+        yield epoch, team, chance, error
+    if distribution.samples:
+        yield epoch, "other", distribution.other, math.nan
 
 
 def game_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:

@@ -25,7 +25,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("epoch", "agent", "name", "island", "algorithm", "fitness", "age", "games", "captain_games", "parent"),
         "aggression",
     ),
-    "team_distribution": ("epoch", "team", "probability"),
+    "team_distribution": ("epoch", "team", "probability", "error"),
     "captain_distribution": ("epoch", "agent", "probability"),
     "island_distribution": ("epoch", "island", "probability"),
     "games": (

@@ -31,7 +31,7 @@ class Parts:
         games: what is played.
         selector: who chooses teams.
         optimizer: what makes members better.
-        room: where the trajectories of an epoch's games go, the same in every epoch; None where nobody learns.
+        room: where the trajectories of an epoch's games go, the same in every epoch; None where nobody looks.
     """
 
     seed: int
@@ -91,10 +91,14 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     selector, optimizer, population = parts.selector, parts.optimizer, run.population
     clock = Clock()
 
-    lineups = selector.select(run.selection, parts.games_per_epoch, population.age, select)
+    lineups = selector.select(run.selection, parts.games_per_epoch // rounds(selector), population.age, select)
     clock.lap("select_s")
     acting = policies(optimizer.islands, population, explore=True)
-    outcomes, experience = parts.games.play(acting, lineups, key(play), record=optimizer.learns, room=parts.room)
+    outcomes, experience = parts.games.play(acting, lineups, key(play), record=watched(parts), room=parts.room)
+    if selector.answers:  # each opponent once more, with teams chosen on what was seen of it
+        lineups = selector.answer(run.selection, lineups, experience, population.age, select)
+        again = parts.games.play(acting, lineups, key(play), record=True)
+        outcomes, experience = outcomes.followed_by(again[0]), experience.followed_by(again[1])
     population = optimizer.rate(population, outcomes)
     clock.lap("play_s")
     population, learnt, healed = optimizer.train(population, experience, learn)
@@ -104,12 +108,22 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     clock.lap("probe_s")
     population, replaced = optimizer.renew(population, renew)
     clock.lap("renew_s")
-    selection, selecting = selector.learn(run.selection, outcomes, study)
+    selection, selecting = selector.learn(run.selection, outcomes, experience, population.fitness, study)
     clock.lap("selector_s")
 
     steps = int(outcomes.steps.sum()) + probes.steps
-    after = Run(run.epoch + 1, population, selection, run.played + len(lineups), run.steps + steps)
+    after = Run(run.epoch + 1, population, selection, run.played + len(outcomes.scores), run.steps + steps)
     return after, Report(outcomes, learnt, healed + replaced, selecting, steps, clock.laps)
+
+
+def rounds(selector: Selector[Any]) -> int:
+    """Returns how often an opponent is met before another comes."""
+    return 2 if selector.answers else 1
+
+
+def watched(parts: Parts) -> bool:
+    """Returns whether anybody wants to know what the players saw."""
+    return parts.optimizer.learns or parts.selector.observes
 
 
 def key(rng: Generator) -> int:

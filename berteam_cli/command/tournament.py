@@ -25,7 +25,7 @@ from berteam_cli.outcomes import Ints
 from berteam_cli.population import names, policies
 from berteam_cli.recording import game_rows
 from berteam_cli.records import COLUMNS, team_name, team_names, write_table
-from berteam_cli.selector.base import SAMPLES, measured, team_count, unordered_teams
+from berteam_cli.selector.base import team_count, unordered_teams
 from berteam_cli.stored import plain_config, stored_config, write_config
 from berteam_cli.training import RECORDS, generator
 
@@ -164,11 +164,10 @@ def of_run(config: TournamentConfig) -> Entry:
     parts = build.parts_to_read(trained)
     run = checkpoint.load(folder, parts).run
     acting = policies(parts.optimizer.islands, run.population, explore=False)
-    found = measured(parts.selector, run.selection, SAMPLES, generator(parts.seed, RECORDS, run.epoch))
-    check_size(min(config.top, len(found.teams)), f"top={config.top}", config)
-    top = np.sort(np.argsort(-found.probability, kind="stable")[: config.top])
+    found = parts.selector.likeliest(run.selection, config.top, generator(parts.seed, RECORDS, run.epoch))
+    check_size(len(found.teams), f"top={config.top}", config)
     called = names(parts.optimizer.islands, run.population)
-    return Entry(parts.games, acting, found.teams[top], called, {"run": str(folder), "epoch": run.epoch})
+    return Entry(parts.games, acting, found.teams, called, {"run": str(folder), "epoch": run.epoch})
 
 
 def elo_rows(standings: Standings, called: list[str]) -> Iterator[tuple[Any, ...]]:

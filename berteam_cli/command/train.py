@@ -48,6 +48,8 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
         log.info("%s", folder)
         state = sum(state_bytes(island) for island in parts.optimizer.islands)
         played = sum(column.nbytes for column in parts.room or ())
+        for remark in parts.selector.remarks():
+            log.info("%s", remark)
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
         manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
         with manifest.until_the_end(), stoppable() as stop:
@@ -83,7 +85,7 @@ def trained(
 ) -> tuple[Run, Recorder]:
     """Runs the epochs; returns the run after the last one, and what recorded it."""
     tables = Tables(folder, saved.table_sizes if saved else None)
-    recorder = Recorder(tables, parts, config.record_every, config.record_teams)
+    recorder = Recorder(tables, parts, config.record_every)
     seconds = saved.seconds if saved else 0.0
     run = saved.run if saved else begin(parts)
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.random import Generator
 
-from berteam_cli.outcomes import Floats, Ints, Lineups, Outcomes
+from berteam_cli.outcomes import Bools, Experience, Floats, Ints, Lineups, Outcomes
 
 S = TypeVar("S")
 
@@ -23,16 +23,31 @@ class Field:
         island_of: (N,) the island of each member.
         team_size: T, places in a team.
         sides: S, teams in a game.
+        valid: (T, N) who may stand at each place, at least one member for each; None: everybody anywhere.
+        exact_limit: up to so many unordered teams the chances of all of them are told exactly.
     """
 
     island_of: Ints
     team_size: int
     sides: int = 2
+    valid: Bools | None = None
+    exact_limit: int = 5000
 
     @property
     def members(self) -> int:
         """N, the size of the population."""
         return len(self.island_of)
+
+    @property
+    def allowed(self) -> Bools:
+        """(T, N) who may stand at each place."""
+        everybody = np.ones((self.team_size, self.members), dtype=np.bool_)
+        return everybody if self.valid is None else self.valid
+
+    @property
+    def alike(self) -> bool:
+        """Whether the same members may stand at all places."""
+        return bool((self.allowed == self.allowed[0]).all())
 
 
 @dataclass(frozen=True)
@@ -44,12 +59,14 @@ class TeamDistribution:
         probability: (K,) of the unordered team.
         other: probability of all teams that are not listed.
         samples: how many teams were drawn to estimate it; 0 where it is exact.
+        error: (K,) standard error of each probability; None where it is exact.
     """
 
     teams: Ints
     probability: Floats
     other: float = 0.0
     samples: int = 0
+    error: Floats | None = None
 
     @property
     def entropy(self) -> float:
@@ -74,10 +91,34 @@ class Selecting:
     buffer: int = 0
 
 
+class Plain:
+    """What selectors share that neither look at games nor answer them."""
+
+    observes = False
+    answers = False
+    by_side = False
+
+    def remarks(self) -> list[str]:
+        """Returns nothing to remark."""
+        return []
+
+
 class Selector(Protocol[S]):
-    """Chooses who plays together; keeps settings only, all that it learns is in ``S``."""
+    """Chooses who plays together; keeps settings only, all that it learns is in ``S``.
+
+    Attributes:
+        field: among whom it chooses.
+        observes: whether ``learn`` wants to know what the players saw.
+        answers: whether every second game of an epoch is against the opponents of the one before, with a team that
+            ``answer`` chooses on what was seen of them.
+        by_side: whether a team's chance depends on the side it plays; then ``sample`` and ``distribution`` take a
+            ``side``, and without one mean a team for a side drawn at random.
+    """
 
     field: Field
+    observes: bool
+    answers: bool
+    by_side: bool
 
     def init(self, rng: Generator) -> S:
         """Returns the state before the first game."""
@@ -96,19 +137,45 @@ class Selector(Protocol[S]):
         """Returns (count, T) teams as the selector would make them of its own will: no noise, no given captains."""
 
     def distribution(self, state: S) -> TeamDistribution:
-        """Returns how likely each unordered team is, exactly. Asks for one row for each possible team."""
+        """Returns how likely each unordered team is, exactly. Lists every team whose chance is not 0."""
+
+    def likeliest(self, state: S, count: int, rng: Generator) -> TeamDistribution:
+        """Returns the ``count`` most probable unordered teams, or those that a search among very many finds."""
 
     def captains(self, state: S) -> Floats:
         """Returns (N,) how likely each member is the first to be chosen for a team."""
 
-    def learn(self, state: S, outcomes: Outcomes, rng: Generator) -> tuple[S, Selecting]:
-        """Returns the state after the games of one epoch; ``state`` itself stays as it was."""
+    def learn(
+        self, state: S, outcomes: Outcomes, seen: Experience, fitness: Floats, rng: Generator
+    ) -> tuple[S, Selecting]:
+        """Returns the state after the games of one epoch; ``state`` itself stays as it was.
+
+        Args:
+            state: what was learnt so far.
+            outcomes: of the epoch's B games; where the selector answers, the second half answers the first.
+            seen: what the players saw in them; without rows unless the selector observes or somebody learns.
+            fitness: (N,) of the members, on the scale of the fitness rule.
+            rng: the only source of chance.
+        """
 
     def tensors(self, state: S) -> dict[str, Any]:
         """Returns all that ``state`` holds as named torch tensors (no copies), for a checkpoint."""
 
     def restored(self, tensors: dict[str, Any]) -> S:
         """Returns the state that ``tensors`` gave these."""
+
+    def remarks(self) -> list[str]:
+        """Returns what a reader of the run's log should know of how this selector was set, a sentence each."""
+
+
+class Answering(Selector[S], Protocol[S]):
+    """A selector that may choose a team for a second game against an opponent, on what was seen in the first."""
+
+    def answer(self, state: S, lineups: Lineups, seen: Experience, ages: Ints, rng: Generator) -> Lineups:
+        """Returns a second game for each of ``lineups``, in which one side chooses anew and the others stay.
+
+        Side b % S of game b chooses. Its ``log_chances`` are those of the new team; those of teams that stay are NaN.
+        """
 
 
 def team_count(members: int, team_size: int) -> int:
@@ -138,21 +205,55 @@ def orderings(teams: Ints) -> Floats:
     return math.factorial(size) / counts
 
 
+def log_orderings(teams: Ints) -> Floats:
+    """Returns (K,) ln of ``orderings``, for teams of any size."""
+    size = teams.shape[1]
+    counts = np.zeros(len(teams))
+    run = np.ones(len(teams))
+    for place in range(1, size):
+        run = np.where(teams[:, place] == teams[:, place - 1], run + 1, 1)
+        counts += np.log(run)
+    return math.lgamma(size + 1) - counts
+
+
 SAMPLES = 20_000  # teams drawn where they are too many to list
+PLACES_ASKED = 200_000  # or fewer, where teams are large: a drawn team costs a network T^2 places
 
 
-def measured(selector: Selector[Any], state: Any, most: int, rng: Generator) -> TeamDistribution:
-    """Returns the distribution over teams: exact if there are at most ``most``, else that of SAMPLES drawn ones.
+def sample_size(team_size: int) -> int:
+    """Returns how many teams are drawn to estimate a distribution."""
+    return max(20, min(SAMPLES, PLACES_ASKED // team_size**2))
 
-    A sampled distribution lists the ``most`` most frequent teams; the rest is its ``other``. It is sampled too where
-    the ordered teams, whose number decides what an exact one costs, are more than 20 for each of ``most``.
+
+def exactly(field: Field) -> bool:
+    """Returns whether the chances of all teams are told exactly.
+
+    They are where there are at most ``field.exact_limit``, unless the ordered partial teams that a network must be
+    asked about, T N^(T - 1), are more than 20 for each of ``exact_limit``.
     """
-    field = selector.field
-    ordered = field.members**field.team_size
-    if team_count(field.members, field.team_size) <= most and ordered <= 20 * most:
+    asked = field.team_size * field.members ** (field.team_size - 1)
+    return team_count(field.members, field.team_size) <= field.exact_limit and asked <= 20 * field.exact_limit
+
+
+def measured(selector: Selector[Any], state: Any, rng: Generator) -> TeamDistribution:
+    """Returns the distribution over teams: exact where ``exactly`` says so, else that of drawn ones.
+
+    A sampled distribution lists the ``exact_limit`` most frequent teams with the standard errors of their shares; the
+    rest is its ``other``.
+    """
+    if exactly(selector.field):
         return selector.distribution(state)
-    drawn = np.sort(selector.sample(state, SAMPLES, rng), axis=1)
+    samples = sample_size(selector.field.team_size)
+    drawn = np.sort(selector.sample(state, samples, rng), axis=1)
     teams, counts = np.unique(drawn, axis=0, return_counts=True)
-    listed = np.sort(np.argsort(-counts, kind="stable")[:most])
-    probability = counts[listed] / SAMPLES
-    return TeamDistribution(teams[listed], probability, max(0.0, 1.0 - float(probability.sum())), SAMPLES)
+    listed = np.sort(np.argsort(-counts, kind="stable")[: selector.field.exact_limit])
+    share = counts[listed] / samples
+    error = np.sqrt(share * (1 - share) / samples)
+    return TeamDistribution(teams[listed], share, max(0.0, 1.0 - float(share.sum())), samples, error)
+
+
+def most_probable(distribution: TeamDistribution, count: int) -> TeamDistribution:
+    """Returns the ``count`` most probable teams of an exact ``distribution``; the rest is its ``other``."""
+    top = np.sort(np.argsort(-distribution.probability, kind="stable")[:count])
+    chances = distribution.probability[top]
+    return TeamDistribution(distribution.teams[top], chances, max(0.0, 1.0 - float(chances.sum())))

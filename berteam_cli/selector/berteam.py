@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -9,34 +10,36 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.random import Generator
+from torch import Tensor
 
-from berteam_cli.outcomes import OPEN, Floats, Ints, Lineups, Outcomes
-from berteam_cli.selector.base import Field, Selecting, TeamDistribution, unordered_teams
+from berteam_cli.outcomes import OPEN, Experience, Floats, Ints, Lineups, Outcomes
+from berteam_cli.selector import beam
+from berteam_cli.selector.base import (
+    Field,
+    Selecting,
+    TeamDistribution,
+    exactly,
+    most_probable,
+    unordered_teams,
+)
+from berteam_cli.selector.berteam_state import BerteamState, restored
 from berteam_cli.selector.captains import SCHEMES, captains, opening
-from berteam_cli.selector.chances import log_chances, total_distribution
-from berteam_cli.selector.filling import drawn, filled, noise
-from berteam_cli.selector.network import POSITIONS, Odds, TeamNetwork, odds_of, seeded
-from berteam_cli.selector.updates import Learnt, untrained, updated
-from berteam_cli.selector.winners import Winners, harvest, no_winners, pushed
-
-LARGEST_WEIGHTED = 8  # T; a team's chance is a sum over 2^T partial teams
+from berteam_cli.selector.chances import (
+    LARGEST_SUMMED,
+    ORDERS,
+    estimated_log_chances,
+    log_chances,
+    total_distribution,
+)
+from berteam_cli.selector.filling import Odds, drawn, filled, noise, proposal
+from berteam_cli.selector.masking import masking_loss
+from berteam_cli.selector.network import POSITIONS, TeamNetwork, by_owner, odds_of, seeded
+from berteam_cli.selector.observations import Looking, Seen, nothing_seen, seen_in
+from berteam_cli.selector.updates import untrained, updated
+from berteam_cli.selector.winners import Examples, Winners, harvest, minibatch, no_winners, pushed
 
 CPU = torch.device("cpu")
-
-
-@dataclass(frozen=True)
-class BerteamState:
-    """All that BERTeam learnt.
-
-    Attributes:
-        learnt: the network's weights and Adam's memory.
-        winners: the teams it learns from.
-        epochs: how many it has seen.
-    """
-
-    learnt: Learnt
-    winners: Winners
-    epochs: int
+KNOWING = ("shared", "token", "separate")  # how a side that is chosen for is told from the others
 
 
 @dataclass(frozen=True, eq=False)  # a field's arrays have no truth value
@@ -53,7 +56,7 @@ class Berteam:
         train_every: epochs from one update to the next.
         batch_size: teams of an update.
         minibatch_size: teams of one gradient step; divides ``batch_size``.
-        capacity: winning teams that are remembered.
+        capacity: winning teams that are remembered, in each ring.
         weight_half_life: wins after which a remembered team counts half; 0 for never.
         draw_weight: weight of each team of a draw; 0 leaves draws out.
         learning_rate: Adam's.
@@ -62,6 +65,9 @@ class Berteam:
         heads: of each attention; divides ``width``.
         dropout: chance of a unit to be dropped in training.
         position: "append", "add" or "none": how the network knows the places of a team apart.
+        side: "shared", all sides are alike; "token", the network reads which it is; "separate", a network each.
+        dataset: "shared", one ring of winners; "per_side", one for each side, all as often learnt from.
+        observations: what of the opponent is known before a team is chosen.
     """
 
     field: Field
@@ -82,18 +88,17 @@ class Berteam:
     heads: int
     dropout: float
     position: str
+    side: str
+    dataset: str
+    observations: Looking
 
     def __post_init__(self) -> None:
         """Refuses settings that exclude each other."""
-        if self.captain not in SCHEMES:
-            raise ValueError(f"selector.captain must be one of {', '.join(SCHEMES)}, but is {self.captain}.")
-        if self.position not in POSITIONS:
-            raise ValueError(f"selector.position must be one of {', '.join(POSITIONS)}, but is {self.position}.")
-        if self.weighting and self.field.team_size > LARGEST_WEIGHTED:
-            raise ValueError(
-                f"selector.weighting needs teams of at most {LARGEST_WEIGHTED}, "
-                f"but they have {self.field.team_size} members; set it to false."
-            )
+        for name, allowed in (("captain", SCHEMES), ("position", POSITIONS), ("side", KNOWING)):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"selector.{name} must be one of {', '.join(allowed)}, but is {getattr(self, name)}.")
+        if self.side == "separate" and self.dataset == "shared":
+            raise ValueError("selector.side=separate needs selector.dataset=per_side: a network learns from its side.")
         if self.batch_size % self.minibatch_size:
             raise ValueError(
                 f"selector.minibatch_size must divide selector.batch_size, "
@@ -104,10 +109,29 @@ class Berteam:
                 f"selector.width must be even and a multiple of selector.heads, {self.heads}, but is {self.width}."
             )
 
+    @property
+    def observes(self) -> bool:
+        """Whether it wants to know what players saw."""
+        return self.observations.use != "none"
+
+    @property
+    def answers(self) -> bool:
+        """Whether it chooses teams for a second game on what was seen in the first."""
+        return self.observations.use == "previous_game"
+
+    @property
+    def by_side(self) -> bool:
+        """Whether a team's chance depends on the side it plays."""
+        return self.side != "shared"
+
     def init(self, rng: Generator) -> BerteamState:
         """Returns random weights and no winners."""
-        winners = no_winners(self.capacity, self.field.team_size)
-        return BerteamState(untrained(self._built(rng), torch.device(self.device)), winners, 0)
+        field, looking = self.field, self.observations
+        networks = field.sides if self.side == "separate" else 1
+        rings = field.sides if self.dataset == "per_side" else 1
+        nobody = no_winners(self.capacity, field.team_size, looking.rows, looking.numbers)
+        device = torch.device(self.device)
+        return BerteamState(tuple(untrained(self._built(rng), device) for _ in range(networks)), (nobody,) * rings, 0)
 
     def select(self, state: BerteamState, games: int, ages: Ints, rng: Generator) -> Lineups:
         """Returns captains by the scheme, and around each a team that the network completes, with noise.
@@ -118,85 +142,129 @@ class Berteam:
             ages: (N,) epochs since each member was last replaced.
             rng: the only source of chance.
         """
-        odds, doubt = self._odds(state), noise(ages, self.noise_half_life)
-        begun = opening(self.captain, odds(self._open(1))[0], doubt)
-        leaders = captains(self.captain, begun, games, self.field.sides, rng)  # (B, S)
+        sides = np.arange(self.field.sides if self.by_side else 1)
+        known = np.broadcast_to(np.arange(self.field.sides) % len(sides), (games, self.field.sides))
+        return self._chosen(self._odds(state, sides), known, ages, rng)
 
-        teams = self._open(leaders.size)
-        places = drawn(begun[:, leaders.ravel()].T, rng)
-        teams[np.arange(len(teams)), places] = leaders.ravel()
-        teams = filled(odds, teams, doubt, rng)
+    def answer(self, state: BerteamState, lineups: Lineups, seen: Experience, ages: Ints, rng: Generator) -> Lineups:
+        """Returns a second game for each of ``lineups``: side b % S of game b chooses anew, on what its members saw.
 
-        chances = np.full(len(teams), np.nan)
-        if self.weighting:
-            chances = log_chances(odds, teams, begun, doubt)
-        return Lineups(teams.reshape(*leaders.shape, -1), leaders, chances.reshape(leaders.shape))
+        The captain of the new team is drawn by the scheme too.
+        """
+        games = np.arange(len(lineups))
+        chooser = games % self.field.sides
+        looked = self._seen(seen, len(lineups))[games, chooser]
+        new = self._chosen(self._odds(state, chooser, looked), games[:, np.newaxis], ages, rng)
+        teams, leaders = lineups.teams.copy(), lineups.captains.copy()
+        chances = np.full(leaders.shape, np.nan)
+        teams[games, chooser], leaders[games, chooser] = new.teams[:, 0], new.captains[:, 0]
+        chances[games, chooser] = new.log_chances[:, 0]
+        return Lineups(teams, leaders, chances)
 
-    def sample(self, state: BerteamState, count: int, rng: Generator) -> Ints:
-        """Returns (count, T) teams filled from nobody, without noise."""
-        return filled(self._odds(state), self._open(count), np.zeros(self.field.members), rng)
+    def sample(
+        self, state: BerteamState, count: int, rng: Generator, side: int | None = None, seen: Seen | None = None
+    ) -> Ints:
+        """Returns (count, T) teams filled from nobody, without noise.
 
-    def distribution(self, state: BerteamState) -> TeamDistribution:
-        """Returns the total distribution (paper, Section 5) over unordered teams; N^(T-1) grows fast."""
-        members, size = self.field.members, self.field.team_size
-        exchangeable = self.position == "none"
-        chances = total_distribution(self._odds(state), members, size, exchangeable=exchangeable)
-        return TeamDistribution(unordered_teams(members, size), chances / chances.sum())  # rounding
+        Args:
+            state: what was learnt so far.
+            count: how many.
+            rng: the only source of chance.
+            side: for which; None for one drawn at random for each team.
+            seen: (count,) what the members of each saw of the opponent; None for nothing.
+        """
+        sides = self._sides(side)
+        if seen is None:
+            known = np.arange(count) % len(sides)
+            odds = self._odds(state, sides)
+        else:
+            known = np.arange(count)
+            odds = self._odds(state, sides[known % len(sides)], seen)
+        return filled(self._own(odds), self._open(count), known, rng)
+
+    def distribution(self, state: BerteamState, side: int | None = None) -> TeamDistribution:
+        """Returns the total distribution (paper, Section 5) over unordered teams; N^(T-1) grows fast.
+
+        Args:
+            state: what was learnt so far.
+            side: for which; None for the mean over sides.
+        """
+        sides = self._sides(side)
+        odds = self._own(self._odds(state, sides))
+        chances = sum(
+            total_distribution(odds, self.field, k, exchangeable=self._exchangeable) for k in range(len(sides))
+        )
+        teams = unordered_teams(self.field.members, self.field.team_size)
+        possible = chances > 0
+        return TeamDistribution(teams[possible], chances[possible] / chances.sum())  # rounding
+
+    def likeliest(self, state: BerteamState, count: int, rng: Generator) -> TeamDistribution:
+        """Returns the ``count`` most probable unordered teams; by a beam search where they cannot all be listed.
+
+        Where sides are told apart, the search is made for each; what it finds weighs the mean over sides.
+        """
+        if exactly(self.field):
+            return most_probable(self.distribution(state), count)
+        sides = self._sides(None)
+        odds = self._own(self._odds(state, sides))
+        return beam.likeliest(odds, self.field, count, rng, exchangeable=self._exchangeable, sources=len(sides))
 
     def captains(self, state: BerteamState) -> Floats:
         """Returns (N,) the mean over places of the network's first choice, without noise (paper, Section 5)."""
-        return self._odds(state)(self._open(1))[0].mean(axis=0)
+        sides = self._sides(None)
+        return self._own(self._odds(state, sides))(self._open(len(sides)), np.arange(len(sides))).mean(axis=(0, 1))
 
-    def learn(self, state: BerteamState, outcomes: Outcomes, rng: Generator) -> tuple[BerteamState, Selecting]:
+    def learn(
+        self, state: BerteamState, outcomes: Outcomes, seen: Experience, fitness: Floats, rng: Generator
+    ) -> tuple[BerteamState, Selecting]:
         """Remembers the winners and, every ``train_every`` epochs, trains the network to complete them."""
-        members = self.field.members if self.weighting else None
-        winners = pushed(state.winners, *harvest(outcomes, self.draw_weight, self.weight_cap, members))
-        after = replace(state, winners=winners, epochs=state.epochs + 1)
-        if after.epochs % self.train_every or not len(winners):
-            return after, Selecting(buffer=len(winners))
-
-        minibatches = self.batch_size // self.minibatch_size
-        learnt, loss = updated(
-            self._network,
-            state.learnt,
-            winners,
-            rng,
-            minibatches=minibatches,
-            size=self.minibatch_size,
-            weight_half_life=self.weight_half_life,
-            learning_rate=self.learning_rate,
+        won = self._harvested(outcomes, seen)
+        rings = tuple(
+            pushed(ring, won[np.flatnonzero(won.sides % len(state.winners) == k)], self.field.members)
+            for k, ring in enumerate(state.winners)
         )
-        return replace(after, learnt=learnt), Selecting(minibatches, loss, len(winners))
+        after = replace(state, winners=rings, epochs=state.epochs + 1)
+        held = sum(len(ring) for ring in rings)
+        if after.epochs % self.train_every or not held:
+            return after, Selecting(buffer=held)
+        learnt, losses = list(state.learnt), []
+        for k, before in enumerate(state.learnt):
+            own = (rings[k],) if self.side == "separate" else rings
+            if any(len(ring) for ring in own):
+                learnt[k], loss = updated(
+                    self._network,
+                    before,
+                    self._minibatches(own, rng),
+                    self._loss,
+                    rng,
+                    learning_rate=self.learning_rate,
+                )
+                losses.append(loss)
+        steps = len(losses) * self.batch_size // self.minibatch_size
+        return replace(after, learnt=tuple(learnt)), Selecting(steps, float(np.mean(losses)), held)
+
+    def remarks(self) -> list[str]:
+        """Returns what is estimated."""
+        size = self.field.team_size
+        if not self.weighting or size <= LARGEST_SUMMED:
+            return []
+        return [
+            f"selector.weighting: teams of {size} can be filled in too many orders to sum over; "
+            f"the chance of each is estimated from {ORDERS} random ones."
+        ]
 
     def tensors(self, state: BerteamState) -> dict[str, Any]:
         """Returns all that ``state`` holds as named tensors, without copies."""
-        learnt, winners = state.learnt, state.winners
-        named = {
-            f"{kind}.{name}": value
-            for kind in ("weights", "means", "squares")
-            for name, value in getattr(learnt, kind).items()
-        }
-        counts = {"steps": learnt.steps, "pushed": winners.pushed, "epochs": state.epochs}
-        return {
-            **named,
-            "winners.teams": torch.from_numpy(winners.teams),
-            "winners.weights": torch.from_numpy(winners.weights),
-            **{name: torch.tensor(count) for name, count in counts.items()},
-        }
+        return state.tensors()
 
     def restored(self, tensors: dict[str, Any]) -> BerteamState:
         """Returns the state that ``tensors`` gave these."""
-        named: dict[str, dict[str, torch.Tensor]] = {"weights": {}, "means": {}, "squares": {}}
-        for name, value in tensors.items():
-            kind, _, parameter = name.partition(".")
-            if kind in named:
-                named[kind][parameter] = value.to(self.device)
-        teams, weights = tensors["winners.teams"].cpu().numpy(), tensors["winners.weights"].cpu().numpy()
-        return BerteamState(
-            Learnt(**named, steps=int(tensors["steps"])),
-            Winners(teams, weights, int(tensors["pushed"])),
-            int(tensors["epochs"]),
-        )
+        return restored(tensors, self.device)
+
+    def embeddings(self, state: BerteamState) -> Floats:
+        """Returns (N, width) the token of each member; the mean over networks where each side has its own."""
+        tokens = [learnt.weights["writer.tokens.weight"][: self.field.members] for learnt in state.learnt]
+        return torch.stack(tokens).mean(dim=0).double().cpu().numpy()
 
     @cached_property
     def _network(self) -> TeamNetwork:
@@ -205,20 +273,97 @@ class Berteam:
 
     def _built(self, rng: Generator) -> TeamNetwork:
         """Returns a network with random weights."""
+        field = self.field
         with seeded(rng, CPU):
             return TeamNetwork(
-                self.field.members,
-                self.field.team_size,
+                field.members,
+                field.team_size,
                 self.layers,
                 self.width,
                 self.heads,
                 self.dropout,
                 self.position,
+                field.sides if self.side == "token" else 1,
+                None,
             )
 
-    def _odds(self, state: BerteamState) -> Odds:
-        """Returns the conditionals of the network in ``state``."""
-        return odds_of(self._network, state.learnt.weights)
+    def _loss(self, network: Callable[..., Tensor], examples: Examples, rng: Generator) -> Tensor:
+        """Returns what an update goes down."""
+        looking = self.observations
+        return masking_loss(network, examples, self.field.members, looking.drop_input, looking.drop_player, rng)
+
+    @property
+    def _exchangeable(self) -> bool:
+        """Whether nothing tells the places of a team apart."""
+        return self.position == "none" and self.field.alike
+
+    def _sides(self, side: int | None) -> Ints:
+        """Returns which sides are to be told apart: ``side``, or all."""
+        return np.arange(self.field.sides if self.by_side else 1) if side is None else np.array([side])
+
+    def _odds(self, state: BerteamState, sides: Ints, seen: Seen | None = None) -> Odds:
+        """Returns the conditionals of the network, or of those of the sides.
+
+        Args:
+            state: what was learnt.
+            sides: (U,) for which side each known thing is; 0 where sides are alike.
+            seen: (U,) what the members saw; None for nothing.
+        """
+        if self.side != "separate":
+            return odds_of(self._network, state.learnt[0].weights, sides, seen)
+        own = [odds_of(self._network, x.weights, np.zeros_like(sides), seen) for x in state.learnt]
+        return by_owner(own, sides)
+
+    def _own(self, odds: Odds) -> Odds:
+        """Returns what teams are drawn from without noise."""
+        return proposal(odds, np.zeros(self.field.members), self.field.allowed)
+
+    def _chosen(self, odds: Odds, known: Ints, ages: Ints, rng: Generator) -> Lineups:
+        """Returns line-ups with (B, S') teams drawn with captains and noise; ``known``, (B, S'), as of Odds."""
+        field, doubt = self.field, noise(ages, self.noise_half_life)
+        sources = int(known.max()) + 1
+        begun = opening(self.captain, odds(self._open(sources), np.arange(sources)), doubt, field.allowed)
+        leaders = captains(self.captain, begun.sum(axis=1)[known], rng)  # (B, S')
+
+        flat, who = known.ravel(), leaders.ravel()
+        teams = self._open(len(flat))
+        teams[np.arange(len(flat)), drawn(begun[flat, :, who], rng)] = who
+        doubted = proposal(odds, doubt, field.allowed)
+        teams = filled(doubted, teams, flat, rng)
+
+        chances = np.full(len(teams), np.nan)
+        if self.weighting and field.team_size <= LARGEST_SUMMED:
+            chances = log_chances(doubted, teams, flat, begun)
+        elif self.weighting:
+            chances = estimated_log_chances(doubted, teams, flat, begun, rng)
+        return Lineups(teams.reshape(*leaders.shape, -1), leaders, chances.reshape(leaders.shape))
+
+    def _harvested(self, outcomes: Outcomes, seen: Experience) -> Examples:
+        """Returns the teams of an epoch to learn from, with what was known when they were chosen."""
+        games, sides = outcomes.scores.shape
+        chosen = np.ones((games, sides), dtype=np.bool_)
+        known = nothing_seen((games, sides), self.field.team_size, self.observations.rows, self.observations.numbers)
+        if self.observations.use == "self":
+            known = self._seen(seen, games)
+        if self.answers:
+            first, second = np.arange(games // 2), np.arange(games // 2, games)
+            chooser = first % sides
+            chosen[second] = chooser[:, np.newaxis] == np.arange(sides)
+            looked = self._seen(seen, games)[first, chooser]
+            known.rows[second, chooser], known.lengths[second, chooser] = looked.rows, looked.lengths
+        log_uniform = -float(np.log(self.field.allowed.sum(axis=1)).sum()) if self.weighting else None
+        return harvest(outcomes, known, chosen, self.draw_weight, self.weight_cap, log_uniform)
+
+    def _seen(self, experience: Experience, games: int) -> Seen:
+        """Returns what the members of all teams saw in ``games`` games, (B, S)."""
+        return seen_in(experience, games, self.field.sides, self.observations)
+
+    def _minibatches(self, rings: tuple[Winners, ...], rng: Generator) -> Iterator[Examples]:
+        """Yields the minibatches of an update, each drawn anew."""
+        for _ in range(self.batch_size // self.minibatch_size):
+            examples = minibatch(rings, self.minibatch_size, self.weight_half_life, rng)
+            alike = self.side != "token"
+            yield replace(examples, sides=np.zeros_like(examples.sides)) if alike else examples
 
     def _open(self, count: int) -> Ints:
         """Returns (count, T) teams that nobody stands in yet."""

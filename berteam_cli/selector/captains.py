@@ -10,38 +10,49 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from berteam_cli.outcomes import Floats, Ints
-from berteam_cli.selector.filling import drawn, towards_uniform
+from berteam_cli.outcomes import Bools, Floats, Ints
+from berteam_cli.selector.filling import drawn, towards_uniform, within
 
 SCHEMES = ("matching", "uniform", "berteam")
 
 
-def opening(scheme: str, odds: Floats, noise: Floats) -> Floats:
-    """Returns (T, N) the chance that the captain stands at a place and is a member; all sum to 1.
+def opening(scheme: str, odds: Floats, noise: Floats, allowed: Bools) -> Floats:
+    """Returns (..., T, N) the chance that the captain stands at a place and is a member; all sum to 1.
 
-    "berteam": the place is uniform, the member comes from the noisy conditional there. Else every member is
-    captain equally often, and stands at a place in proportion to the network's chance of the member there.
+    "berteam": the place is uniform, the member comes from the noisy conditional there. Else every member who may
+    stand anywhere is captain equally often, and stands at one of its places in proportion to the network's chance of
+    the member there.
 
     Args:
         scheme: one of SCHEMES.
-        odds: (T, N) chances of the members at each place of a team nobody stands in yet.
+        odds: (..., T, N) the network's chances of the members at each place of a team nobody stands in yet.
         noise: (N,) in [0, 1].
+        allowed: (T, N) who may stand at each place.
     """
     if scheme == "berteam":
-        return towards_uniform(odds, noise) / len(odds)
-    odds = np.maximum(odds, np.finfo(np.float64).tiny)  # a captain unthinkable everywhere still stands somewhere
-    return odds / odds.sum(axis=0) / odds.shape[1]
+        return within(towards_uniform(odds, noise), allowed) / len(allowed)
+    # A captain unthinkable everywhere still stands somewhere.
+    odds = np.where(allowed, np.maximum(within(odds, allowed), np.finfo(np.float64).tiny), 0.0)
+    anywhere = odds.sum(axis=-2, keepdims=True)
+    share = np.divide(odds, anywhere, out=np.zeros_like(odds), where=anywhere > 0)
+    return share / allowed.any(axis=0).sum()
 
 
-def captains(scheme: str, opening: Floats, games: int, sides: int, rng: Generator) -> Ints:
-    """Returns (B, S) the captains of ``games`` games by ``scheme``; ``opening`` as above."""
-    members = opening.shape[1]
-    if scheme == "matching":
-        return dealt(games, sides, members, rng)
-    if scheme == "uniform":
-        return distinct(games, sides, members, rng)
-    chances = np.broadcast_to(opening.sum(axis=0), (games * sides, members))
-    return drawn(chances, rng).reshape(games, sides)
+def captains(scheme: str, chances: Floats, rng: Generator) -> Ints:
+    """Returns (B, S) the captains of B games by ``scheme``.
+
+    Args:
+        scheme: one of SCHEMES.
+        chances: (B, S, N) of each member to be the captain of each team, where the network decides; a member that may
+            not stand in a team has none.
+        rng: the only source of chance.
+    """
+    games, sides, members = chances.shape
+    if scheme == "berteam":
+        return drawn(chances.reshape(-1, members), rng).reshape(games, sides)
+    deal = dealt if scheme == "matching" else distinct
+    eligible = np.flatnonzero(chances[0, 0] > 0)
+    return eligible[deal(games, sides, len(eligible), rng)]
 
 
 def distinct(games: int, sides: int, members: int, rng: Generator) -> Ints:

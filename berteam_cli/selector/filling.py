@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.random import Generator
 
-from berteam_cli.outcomes import OPEN, Floats, Ints
-from berteam_cli.selector.network import Odds
+from berteam_cli.outcomes import OPEN, Bools, Floats, Ints
+
+Odds = Callable[[Ints, Ints], Floats]
+"""Chances of each member at each place of partial teams, (K, T, N), last axis summing to 1.
+
+Called with the teams (K, T), OPEN where nobody stands yet, and (K,) the index of what else is known for each team: of
+the side it plays, or of what was seen of its opponent.
+"""
 
 
 def noise(ages: Ints, half_life: float) -> Floats:
@@ -34,6 +42,35 @@ def towards_uniform(odds: Floats, noise: Floats) -> Floats:
     return mixed / mixed.sum(axis=-1, keepdims=True)
 
 
+def within(odds: Floats, allowed: Bools) -> Floats:
+    """Returns ``odds``, (..., T, N), with nothing for members who may not stand at a place, and normalised.
+
+    Args:
+        odds: chances of the members.
+        allowed: (T, N) who may stand at each place, at least one member for each.
+    """
+    if allowed.all():
+        return odds
+    # However unthinkable all who may stand there are, one of them will.
+    kept = np.where(allowed, np.maximum(odds, np.finfo(np.float64).tiny), 0.0)
+    return kept / kept.sum(axis=-1, keepdims=True)
+
+
+def proposal(odds: Odds, noise: Floats, allowed: Bools) -> Odds:
+    """Returns the conditionals that teams are truly drawn from: with noise for new members, and within the rules.
+
+    Args:
+        odds: the network's.
+        noise: (N,) in [0, 1].
+        allowed: (T, N).
+    """
+
+    def proposed(teams: Ints, known: Ints) -> Floats:
+        return within(towards_uniform(odds(teams, known), noise), allowed)
+
+    return proposed
+
+
 def drawn(chances: Floats, rng: Generator) -> Ints:
     """Returns (K,) one column of each row of ``chances``, (K, C), drawn in proportion to them."""
     reached = np.cumsum(chances, axis=1)
@@ -41,23 +78,28 @@ def drawn(chances: Floats, rng: Generator) -> Ints:
     return (reached > rng.random((len(chances), 1))).argmax(axis=1)
 
 
-def filled(odds: Odds, teams: Ints, noise: Floats, rng: Generator) -> Ints:
+def filled(odds: Odds, teams: Ints, known: Ints, rng: Generator) -> Ints:
     """Returns ``teams`` with every OPEN place filled, one place of each team at a time.
 
-    Each time an open place is chosen uniformly and its member drawn from the network's conditional there, moved
-    towards uniform by the noise. Members may repeat.
+    Each time an open place is chosen uniformly and its member drawn from the conditional there. Members may repeat.
 
     Args:
-        odds: the network's conditionals.
+        odds: what to draw from.
         teams: (K, T), all with the same number of OPEN places.
-        noise: (N,) in [0, 1].
+        known: (K,) as of Odds.
         rng: the only source of chance.
     """
     teams = teams.copy()
     rows = np.arange(len(teams))
     for _ in range(int((teams == OPEN).sum(axis=1).max(initial=0))):
         place = np.where(teams == OPEN, rng.random(teams.shape), -1.0).argmax(axis=1)
-        partial, which = np.unique(teams, axis=0, return_inverse=True)  # at first all teams are alike
-        chances = odds(partial)[which.reshape(-1), place]  # (K, N)
-        teams[rows, place] = drawn(towards_uniform(chances, noise), rng)
+        partial, sources, which = distinct_rows(teams, known)  # at first all teams are alike
+        chances = odds(partial, sources)[which, place]  # (K, N)
+        teams[rows, place] = drawn(chances, rng)
     return teams
+
+
+def distinct_rows(teams: Ints, known: Ints) -> tuple[Ints, Ints, Ints]:
+    """Returns the distinct rows of ``teams``, (K, T), with their ``known``, and (K,) which of them each row is."""
+    unique, which = np.unique(np.column_stack([known, teams]), axis=0, return_inverse=True)
+    return unique[:, 1:], unique[:, 0], which.reshape(-1)

@@ -5,12 +5,15 @@ Paper, Section 3, "Training Procedure"; the masks are those of BERT.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from numpy.random import Generator
 from torch import Tensor
 
 from berteam_cli.outcomes import OPEN, Bools, Ints
+from berteam_cli.selector.winners import Examples
 
 SHOWN_AS_MASK = 0.8  # of the hidden places; BERT's shares
 SHOWN_AS_ANYONE = 0.1  # the rest is shown as it is
@@ -51,3 +54,40 @@ def guessing_loss(logits: Tensor, teams: Tensor, hidden: Tensor, weights: Tensor
     surprise = -torch.log_softmax(logits, dim=-1).gather(-1, teams[..., None])[..., 0]  # (K, T)
     per_team = (surprise * hidden).sum(dim=1) / hidden.sum(dim=1)
     return (weights * per_team).mean()
+
+
+def forgotten(lengths: Ints, drop_input: float, drop_player: float, rng: Generator) -> Ints:
+    """Returns ``lengths``, (K, T) rows that each member saw, 0 for those who are taken to have seen nothing.
+
+    All members of a team with chance ``drop_input``, else each with chance ``drop_player``. What a member saw is kept
+    or dropped whole, so that in training it looks as it does when a team is chosen.
+    """
+    whole = rng.random((len(lengths), 1)) < drop_input
+    return np.where(whole | (rng.random(lengths.shape) < drop_player), 0, lengths)
+
+
+def masking_loss(
+    network: Callable[..., Tensor],
+    examples: Examples,
+    members: int,
+    drop_input: float,
+    drop_player: float,
+    rng: Generator,
+) -> Tensor:
+    """Returns the loss of guessing hidden members of a minibatch, in nats.
+
+    Args:
+        network: from its inputs to logits.
+        examples: weights with mean 1.
+        members: N.
+        drop_input: as of ``forgotten``.
+        drop_player: as there.
+        rng: the only source of chance.
+    """
+    shown, hidden = masked(examples.teams, members, rng)
+    seen = (None, None)
+    if examples.rows.shape[2]:
+        seen = (examples.rows, forgotten(examples.lengths, drop_input, drop_player, rng))
+    logits = network(shown, examples.sides, *seen)
+    teams, hidden, weights = (torch.from_numpy(x).to(logits.device) for x in (examples.teams, hidden, examples.weights))
+    return guessing_loss(logits, teams, hidden, weights.float())

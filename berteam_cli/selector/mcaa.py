@@ -12,9 +12,11 @@ import numpy as np
 import torch
 from numpy.random import Generator
 
-from berteam_cli.outcomes import NOBODY, Floats, Ints, Lineups, Outcomes
+from berteam_cli.outcomes import NOBODY, Experience, Floats, Ints, Lineups, Outcomes
 from berteam_cli.rating.elo import softmax
-from berteam_cli.selector.base import Field, Selecting, TeamDistribution, orderings, unordered_teams
+from berteam_cli.selector import independent
+from berteam_cli.selector.base import Field, Plain, Selecting, TeamDistribution, exactly
+from berteam_cli.selector.filling import within
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,8 @@ class McaaState:
         return softmax(self.logits)
 
 
-@dataclass(frozen=True)
-class Mcaa:
+@dataclass(frozen=True, eq=False)
+class Mcaa(Plain):
     """Moves the islands' shares towards those among the winners.
 
     Attributes:
@@ -61,25 +63,27 @@ class Mcaa:
         sides = self.field.sides
         teams = self.sample(state, games * sides, rng).reshape(games, sides, self.field.team_size)
         nobody = np.full((games, sides), NOBODY, dtype=np.int64)
-        return Lineups(teams, nobody, np.log(self.captains(state))[teams].sum(axis=2))
+        return Lineups(teams, nobody, independent.log_chances(self._chances(state), teams))
 
     def sample(self, state: McaaState, count: int, rng: Generator) -> Ints:
         """Returns (count, T) teams."""
-        chances = self.captains(state)
-        return rng.choice(self.field.members, size=(count, self.field.team_size), p=chances)
+        return independent.sampled(self._chances(state), count, rng)
 
     def distribution(self, state: McaaState) -> TeamDistribution:
         """Returns the chance of every unordered team: its orders times the product of its members' chances."""
-        teams = unordered_teams(self.field.members, self.field.team_size)
-        return TeamDistribution(teams, orderings(teams) * self.captains(state)[teams].prod(axis=1))
+        return independent.distribution(self._chances(state), self.field)
+
+    def likeliest(self, state: McaaState, count: int, rng: Generator) -> TeamDistribution:
+        """Returns the ``count`` most probable teams."""
+        return independent.top(self._chances(state), self.field, count, rng, listed=exactly(self.field))
 
     def captains(self, state: McaaState) -> Floats:
-        """Returns (N,) the chance of each member to be given a place."""
-        sizes = np.bincount(self.field.island_of)
-        chances = (state.shares / sizes)[self.field.island_of]
-        return chances / chances.sum()  # np.random wants a sum of 1 to the last bits
+        """Returns (N,) how often each member stands at a place."""
+        return self._chances(state).mean(axis=0)
 
-    def learn(self, state: McaaState, outcomes: Outcomes, rng: Generator) -> tuple[McaaState, Selecting]:
+    def learn(
+        self, state: McaaState, outcomes: Outcomes, seen: Experience, fitness: Floats, rng: Generator
+    ) -> tuple[McaaState, Selecting]:
         """Returns the state after counting the winners and, every ``train_every`` epochs, one gradient step.
 
         The step goes down half the squared distance between the winners' island shares q and the own shares s:
@@ -107,3 +111,9 @@ class Mcaa:
     def restored(self, tensors: dict[str, Any]) -> McaaState:
         """Returns the state that gave ``tensors``."""
         return McaaState(tensors["logits"].numpy(), tensors["wins"].numpy(), int(tensors["epochs"]))
+
+    def _chances(self, state: McaaState) -> Floats:
+        """Returns (T, N) the chance of each member at each place, in proportion to its island's share."""
+        sizes = np.bincount(self.field.island_of)
+        chances = (state.shares / sizes)[self.field.island_of]
+        return within(np.tile(chances / chances.sum(), (self.field.team_size, 1)), self.field.allowed)

@@ -6,7 +6,7 @@ Paper, Section 3, "Model Architecture"; its sizes stand in Appendix E.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -16,54 +16,110 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from berteam_cli.outcomes import OPEN, Floats, Ints
+from berteam_cli.selector.filling import Odds
+from berteam_cli.selector.observations import Seen
 
 POSITIONS = ("append", "add", "none")  # how a token learns its place in the team
 
 ROWS = 2048  # teams of one forward pass; bounds the memory of large requests
 
-Odds = Callable[[Ints], Floats]
-"""Maps partial teams (K, T), OPEN where nobody stands yet, to (K, T, N) chances of each member at each place."""
-
 
 class TeamNetwork(nn.Module):
     """Says who could stand at each place of a partly filled team.
 
-    The encoder reads the source, the decoder reads the team and attends to all of its places in both directions.
-    The source is one learnt token: whatever is known of the opponent before the game would become more of them.
-    With position "none" nothing tells the places of a team apart.
+    The reader encodes what is known before the game: a learnt token for the side, and what each member saw of the
+    opponent. The writer attends to that and to all places of the team in both directions. With position "none" nothing
+    tells the places of a team apart.
 
     Args:
-        members: N, one token and one output each; the tokens MASK and source have no output.
+        members: N, one token and one output each; the token MASK has no output.
         team_size: T.
         layers: of the encoder, and as many of the decoder.
         width: numbers in a token, even and a multiple of ``heads``; the feed-forward layers are four times as wide.
         heads: of each attention.
         dropout: chance of a unit to be dropped in training.
         position: one of POSITIONS.
+        sides: side tokens; 1 where all sides are alike.
+        embedder: turns what a member saw into one token; None where nothing is ever seen.
     """
 
     def __init__(
-        self, members: int, team_size: int, layers: int, width: int, heads: int, dropout: float, position: str
+        self,
+        members: int,
+        team_size: int,
+        layers: int,
+        width: int,
+        heads: int,
+        dropout: float,
+        position: str,
+        sides: int = 1,
+        embedder: nn.Module | None = None,
     ) -> None:
         """Builds the layers with torch's random weights."""
         super().__init__()
         self.members = members
+        self.reader = Reader(layers, width, heads, dropout, sides, embedder)
+        self.writer = Writer(members, team_size, layers, width, heads, dropout, position)
+
+    def forward(
+        self, teams: Tensor, sides: Tensor, rows: Tensor | None = None, lengths: Tensor | None = None
+    ) -> Tensor:
+        """Returns (K, T, N) logits of the members at each place of ``teams``, (K, T) with OPEN places.
+
+        Args:
+            teams: the partial teams.
+            sides: (K,) side token of each.
+            rows: (K, P, R, O) what its players saw; None for nothing.
+            lengths: (K, P) rows that hold something; 0 for a player who saw nothing.
+        """
+        return self.writer(teams, *self.reader(sides, rows, lengths))
+
+
+class Reader(nn.Module):
+    """Encodes the source: one token for the side and one for each player who saw something."""
+
+    def __init__(
+        self, layers: int, width: int, heads: int, dropout: float, sides: int, embedder: nn.Module | None
+    ) -> None:
+        """Builds the layers; see TeamNetwork."""
+        super().__init__()
+        self.sides = nn.Embedding(sides, width)
+        self.embedder = embedder
+        layer = nn.TransformerEncoderLayer(width, heads, 4 * width, dropout, batch_first=True)
+        self.encoder = nn.TransformerEncoder(layer, layers, nn.LayerNorm(width), enable_nested_tensor=False)
+
+    def forward(self, sides: Tensor, rows: Tensor | None, lengths: Tensor | None) -> tuple[Tensor, Tensor | None]:
+        """Returns (U, 1 + P, width) the memory, and (U, 1 + P) which tokens stand for nobody, None if none does."""
+        source = self.sides(sides)[:, None]
+        if self.embedder is None or rows is None or lengths is None:
+            return self.encoder(source), None
+        absent = torch.cat([torch.zeros_like(sides, dtype=torch.bool)[:, None], lengths == 0], dim=1)
+        source = torch.cat([source, self.embedder(rows.to(source.dtype), lengths)], dim=1)
+        return self.encoder(source, src_key_padding_mask=absent), absent
+
+
+class Writer(nn.Module):
+    """Completes teams, attending to the memory that the reader made."""
+
+    def __init__(
+        self, members: int, team_size: int, layers: int, width: int, heads: int, dropout: float, position: str
+    ) -> None:
+        """Builds the layers; see TeamNetwork."""
+        super().__init__()
+        self.members = members
         self.position = position
-        self.tokens = nn.Embedding(members + 2, width)  # N members, MASK, source
+        self.tokens = nn.Embedding(members + 1, width)  # N members, MASK
         self.register_buffer("places", sinusoids(team_size, width), persistent=False)
         self.joined = nn.Linear(2 * width, width) if position == "append" else None
         self.dropped = nn.Dropout(dropout)
-        self.transformer = nn.Transformer(width, heads, layers, layers, 4 * width, dropout, batch_first=True)
+        layer = nn.TransformerDecoderLayer(width, heads, 4 * width, dropout, batch_first=True)
+        self.decoder = nn.TransformerDecoder(layer, layers, nn.LayerNorm(width))
         self.head = nn.Linear(width, members)
 
-    def forward(self, teams: Tensor) -> Tensor:
-        """Returns (K, T, N) logits of the members at each place of ``teams``, (K, T) with OPEN places."""
-        mask, source = self.members, self.members + 1
-        # Dropout makes every team see the source differently; without it all see the same.
-        sources = len(teams) if self.training else 1
-        memory = self.transformer.encoder(self.tokens.weight[source].expand(sources, 1, -1))
-        hidden = self.placed(self.tokens(torch.where(teams == OPEN, mask, teams)))
-        return self.head(self.transformer.decoder(hidden, memory.expand(len(teams), -1, -1)))
+    def forward(self, teams: Tensor, memory: Tensor, absent: Tensor | None) -> Tensor:
+        """Returns (K, T, N) logits; ``memory``, (K, M, width), and ``absent``, (K, M), as the reader returns them."""
+        hidden = self.placed(self.tokens(torch.where(teams == OPEN, self.members, teams)))
+        return self.head(self.decoder(hidden, memory, memory_key_padding_mask=absent))
 
     def placed(self, tokens: Tensor) -> Tensor:
         """Returns ``tokens``, (K, T, width), with the place of each written into it."""
@@ -97,19 +153,57 @@ def seeded(rng: Generator, device: torch.device) -> Iterator[None]:
         yield
 
 
-def odds_of(network: TeamNetwork, weights: dict[str, Tensor]) -> Odds:
-    """Returns the odds that ``network`` gives with ``weights``, in float64, without dropout."""
-    device = next(iter(weights.values())).device
+def odds_of(network: TeamNetwork, weights: dict[str, Tensor], sides: Ints, seen: Seen | None = None) -> Odds:
+    """Returns the odds that ``network`` gives with ``weights``, in float64, without dropout.
 
-    def odds(teams: Ints) -> Floats:
+    Args:
+        network: holds the architecture; its own weights do not matter.
+        weights: by parameter name.
+        sides: (U,) side token of each thing that can be known.
+        seen: (U,) what the members saw; None for nothing.
+    """
+    device = next(iter(weights.values())).device
+    reading, writing = part_of(weights, "reader."), part_of(weights, "writer.")
+    network.eval()
+    with torch.inference_mode():
+        known = (sides, None, None) if seen is None else (sides, seen.rows, seen.lengths)
+        inputs = tuple(None if x is None else torch.from_numpy(x).to(device) for x in known)
+        memory, absent = functional_call(network.reader, reading, inputs)
+
+    def odds(teams: Ints, known: Ints) -> Floats:
         network.eval()
         chances = np.empty((*teams.shape, network.members))
         with torch.inference_mode():
             for first in range(0, len(teams), ROWS):
                 rows = slice(first, first + ROWS)
-                logits = functional_call(network, weights, torch.from_numpy(teams[rows]).to(device))
+                which = torch.from_numpy(known[rows]).to(device)
+                hidden = None if absent is None else absent[which]
+                asked = (torch.from_numpy(teams[rows]).to(device), memory[which], hidden)
+                logits = functional_call(network.writer, writing, asked)
                 # float64 after the network: products over many fill orders must still sum to 1.
                 chances[rows] = torch.softmax(logits.double(), dim=-1).cpu().numpy()
         return chances
 
     return odds
+
+
+def by_owner(own: Sequence[Odds], owner: Ints) -> Odds:
+    """Returns the odds of several networks as one: what is known as number u is known to network ``owner[u]``."""
+
+    def odds(teams: Ints, known: Ints) -> Floats:
+        chances: Floats | None = None
+        for k, ask in enumerate(own):
+            mine = owner[known] == k
+            if mine.any():
+                answer = ask(teams[mine], known[mine])
+                chances = np.empty((len(teams), *answer.shape[1:])) if chances is None else chances
+                chances[mine] = answer
+        assert chances is not None  # nobody asks about no team
+        return chances
+
+    return odds
+
+
+def part_of(weights: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    """Returns the weights whose names begin with ``prefix``, without it."""
+    return {name.removeprefix(prefix): value for name, value in weights.items() if name.startswith(prefix)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +11,8 @@ from numpy.random import Generator
 from torch import Tensor
 from torch.func import functional_call
 
-from berteam_cli.selector.masking import guessing_loss, masked
 from berteam_cli.selector.network import TeamNetwork, seeded
-from berteam_cli.selector.winners import Winners, minibatch
+from berteam_cli.selector.winners import Examples
 
 
 @dataclass(frozen=True)
@@ -40,27 +40,27 @@ def untrained(network: TeamNetwork, device: torch.device) -> Learnt:
     return Learnt(weights, means, squares, 0)
 
 
+Loss = Callable[[Callable[..., Tensor], Examples, Generator], Tensor]
+"""What a gradient step goes down: of the network, from arrays of its inputs to logits, and a minibatch of examples."""
+
+
 def updated(
     network: TeamNetwork,
     learnt: Learnt,
-    winners: Winners,
+    minibatches: Iterable[Examples],
+    loss_of: Loss,
     rng: Generator,
     *,
-    minibatches: int,
-    size: int,
-    weight_half_life: float,
     learning_rate: float,
 ) -> tuple[Learnt, float]:
-    """Returns what is learnt after one Adam step on each minibatch, and the mean loss in nats.
+    """Returns what is learnt after one Adam step on each minibatch, and the mean loss.
 
     Args:
         network: holds the architecture; its own weights do not matter.
         learnt: stays as it is.
-        winners: at least one; every minibatch is drawn anew from all of them.
+        minibatches: at least one.
+        loss_of: what to go down.
         rng: the only source of chance.
-        minibatches: how many steps.
-        size: teams in a minibatch.
-        weight_half_life: as in ``minibatch``.
         learning_rate: Adam's; its other settings are torch's defaults.
     """
     weights = {name: value.clone().requires_grad_() for name, value in learnt.weights.items()}
@@ -74,13 +74,14 @@ def updated(
     device = next(iter(weights.values())).device
     losses = []
     network.train()
+
+    def asked(*inputs: np.ndarray | None) -> Tensor:
+        on_device = (None if x is None else torch.from_numpy(x).to(device) for x in inputs)
+        return functional_call(network, weights, tuple(on_device))
+
     with seeded(rng, device):
-        for _ in range(minibatches):
-            teams, shares = minibatch(winners, size, weight_half_life, rng)
-            shown, hidden = masked(teams, network.members, rng)
-            shown, teams, hidden = (torch.from_numpy(array).to(device) for array in (shown, teams, hidden))
-            logits = functional_call(network, weights, shown)
-            loss = guessing_loss(logits, teams, hidden, torch.from_numpy(shares).to(device, torch.float32))
+        for examples in minibatches:
+            loss = loss_of(asked, examples, rng)
             adam.zero_grad()
             loss.backward()
             adam.step()
@@ -89,6 +90,6 @@ def updated(
         {name: weight.detach() for name, weight in weights.items()},
         {name: adam.state[weight]["exp_avg"] for name, weight in weights.items()},
         {name: adam.state[weight]["exp_avg_sq"] for name, weight in weights.items()},
-        learnt.steps + minibatches,
+        learnt.steps + len(losses),
     )
     return after, float(np.mean(losses))

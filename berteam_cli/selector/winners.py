@@ -2,13 +2,41 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import numpy.typing as npt
 from numpy.random import Generator
 
-from berteam_cli.outcomes import OPEN, Floats, Ints, Outcomes
+from berteam_cli.outcomes import OPEN, Bools, Floats, Ints, Outcomes
+from berteam_cli.selector.observations import Seen
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Teams to learn from.
+
+    Attributes:
+        teams: (K, T) members.
+        weights: (K,).
+        sides: (K,) the side each team played.
+        rows: (K, T, R, O) float16, what each member saw of the opponent before the team was chosen.
+        lengths: (K, T) how many of the R rows hold something; 0 where nothing was seen.
+    """
+
+    teams: Ints
+    weights: Floats
+    sides: Ints
+    rows: npt.NDArray[np.float16]
+    lengths: Ints
+
+    def __len__(self) -> int:
+        return len(self.teams)
+
+    def __getitem__(self, rows: Ints) -> Examples:
+        """Returns some of the examples."""
+        return Examples(*(getattr(self, x.name)[rows] for x in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -16,76 +44,121 @@ class Winners:
     """A ring: the newest team takes the place of the oldest.
 
     Attributes:
-        teams: (C, T) members; OPEN in rows that were never used.
-        weights: (C,) weight of each team on the day it won; 0 in rows that were never used.
+        held: C examples, each with its weight on the day it won; OPEN and 0 in rows that were never used.
         pushed: teams pushed since the start; the next goes to row ``pushed % C``.
     """
 
-    teams: Ints
-    weights: Floats
+    held: Examples
     pushed: int
 
     def __len__(self) -> int:
-        return min(self.pushed, len(self.teams))
+        return min(self.pushed, len(self.held))
 
     @property
     def ages(self) -> Ints:
         """(len,) teams pushed after each one."""
-        return (self.pushed - 1 - np.arange(len(self))) % len(self.teams)
+        return (self.pushed - 1 - np.arange(len(self))) % len(self.held)
 
 
-def no_winners(capacity: int, team_size: int) -> Winners:
-    """Returns an empty ring for ``capacity`` teams."""
-    return Winners(np.full((capacity, team_size), OPEN), np.zeros(capacity), 0)
-
-
-def pushed(winners: Winners, teams: Ints, weights: Floats) -> Winners:
-    """Returns ``winners`` with ``teams``, (K, T), and their ``weights``, (K,), pushed one after the other."""
-    capacity = len(winners.teams)
-    rows = (winners.pushed + np.arange(len(teams)))[-capacity:] % capacity
-    new = Winners(winners.teams.copy(), winners.weights.copy(), winners.pushed + len(teams))
-    new.teams[rows] = teams[-capacity:]
-    new.weights[rows] = weights[-capacity:]
-    return new
-
-
-def minibatch(winners: Winners, size: int, half_life: float, rng: Generator) -> tuple[Ints, Floats]:
-    """Returns (size, T) teams drawn uniformly with replacement and their (size,) weights, scaled to a mean of 1.
+def no_winners(capacity: int, team_size: int, rows: int = 0, numbers: int = 0) -> Winners:
+    """Returns an empty ring for ``capacity`` teams.
 
     Args:
-        winners: at least one.
+        capacity: C.
+        team_size: T.
+        rows: R, observations kept of each member.
+        numbers: O, numbers of an observation.
+    """
+    return Winners(
+        Examples(
+            np.full((capacity, team_size), OPEN),
+            np.zeros(capacity),
+            np.zeros(capacity, dtype=np.int64),
+            np.zeros((capacity, team_size, rows, numbers), dtype=np.float16),
+            np.zeros((capacity, team_size), dtype=np.int64),
+        ),
+        0,
+    )
+
+
+def pushed(winners: Winners, new: Examples, members: int) -> Winners:
+    """Returns ``winners`` with the examples ``new`` pushed one after the other.
+
+    Raises:
+        ValueError: a member is not in [0, ``members``), or a weight is negative or not finite.
+    """
+    check(new, members)
+    if not len(new):
+        return winners
+    capacity = len(winners.held)
+    rows = (winners.pushed + np.arange(len(new)))[-capacity:] % capacity
+    columns = []
+    for x in fields(Examples):
+        column = getattr(winners.held, x.name).copy()
+        column[rows] = getattr(new, x.name)[-capacity:]
+        columns.append(column)
+    return Winners(Examples(*columns), winners.pushed + len(new))
+
+
+def check(examples: Examples, members: int) -> None:
+    """Checks what the network is to learn from.
+
+    Raises:
+        ValueError: a member is not in [0, ``members``), or a weight is negative or not finite.
+    """
+    outside = (examples.teams < 0) | (examples.teams >= members)
+    if outside.any():
+        raise ValueError(f"a team to learn from has member {examples.teams[outside][0]}, but there are {members}.")
+    wrong = ~(np.isfinite(examples.weights) & (examples.weights >= 0))
+    if wrong.any():
+        raise ValueError(f"a weight must be finite and not negative, but one is {examples.weights[wrong][0]}.")
+
+
+def minibatch(rings: Sequence[Winners], size: int, half_life: float, rng: Generator) -> Examples:
+    """Returns ``size`` examples drawn uniformly with replacement, as many of each ring, weights scaled to a mean of 1.
+
+    Args:
+        rings: not all empty; those that are give nothing.
         size: how many to draw.
         half_life: pushed teams after which a team counts half; 0 for never.
         rng: the only source of chance.
     """
-    rows = rng.integers(len(winners), size=size)
-    weights = winners.weights[rows]
+    filled = [ring for ring in rings if len(ring)]
+    shares = np.bincount(np.arange(size) % len(filled), minlength=len(filled))
+    rows = [rng.integers(len(ring), size=share) for ring, share in zip(filled, shares, strict=True)]
+    parts = [ring.held[drawn] for ring, drawn in zip(filled, rows, strict=True)]
+    examples = Examples(*(np.concatenate([getattr(part, x.name) for part in parts]) for x in fields(Examples)))
+    weights = examples.weights
     if half_life > 0:
-        ages = winners.ages[rows]
+        ages = np.concatenate([ring.ages[drawn] for ring, drawn in zip(filled, rows, strict=True)])
         weights = weights * 0.5 ** ((ages - ages.min()) / half_life)  # only ratios matter; the youngest cannot vanish
-    return winners.teams[rows], weights / weights.mean()
+    return replace(examples, weights=weights / weights.mean())
 
 
-def harvest(outcomes: Outcomes, draw_weight: float, weight_cap: float, members: int | None) -> tuple[Ints, Floats]:
-    """Returns (K, T) the teams to learn from, games in order, and their (K,) weights.
+def harvest(
+    outcomes: Outcomes, seen: Seen, chosen: Bools, draw_weight: float, weight_cap: float, log_uniform: float | None
+) -> Examples:
+    """Returns the teams to learn from, games in order.
 
-    With inverse probability weighting a team A weighs w = min(1 / (N^T P(A)), cap), so that the weighted share of
-    every team is proportional to how often it wins, however often it is chosen (Appendix D, which has no cap).
+    With inverse probability weighting a team A weighs w = min(U / P(A), cap), U the chance of each team where all are
+    equally likely, so that the weighted share of every team is proportional to how often it wins, however often it is
+    chosen (Appendix D, which has no cap).
 
     Args:
-        outcomes: of one epoch.
+        outcomes: of B games.
+        seen: what each team knew when it was chosen, (B, S).
+        chosen: (B, S) which of the teams were chosen for their game.
         draw_weight: factor for the teams of a draw; 0 leaves them out.
         weight_cap: largest weight before that factor.
-        members: N to weight by inverse probability; None to give every team weight 1.
+        log_uniform: ln U to weight by inverse probability; None to give every team weight 1.
     """
     scores, lineups = outcomes.scores, outcomes.lineups
-    value = np.where(scores == 1.0, 1.0, np.where(scores == 0.5, draw_weight, 0.0))  # (B, S)
-    kept = value > 0
-    teams, weights = lineups.teams[kept], value[kept]
-    if members is not None:
+    value = np.where(scores == 1.0, 1.0, np.where(scores > 0.0, draw_weight, 0.0))  # (B, S)
+    kept = (value > 0) & chosen
+    weights = value[kept]
+    if log_uniform is not None:
         chances = lineups.log_chances[kept]
         if np.isnan(chances).any():
             raise ValueError("selector.weighting needs log_chances of every team, but some are NaN.")
-        log_weights = -teams.shape[1] * math.log(members) - chances
-        weights = weights * np.exp(np.minimum(log_weights, math.log(weight_cap)))
-    return teams, weights
+        weights = weights * np.exp(np.minimum(log_uniform - chances, np.log(weight_cap)))
+    return Examples(lineups.teams[kept], weights, np.nonzero(kept)[1], seen.rows[kept], seen.lengths[kept])
