@@ -246,9 +246,9 @@ def inspect(word: str, words: list[str]) -> None:
     )
     if given.top < 1:
         raise InputError(f"--top must be >= 1, but is {given.top}.")
-    from berteam_cli.command.inspect import show  # noqa: PLC0415
+    from berteam_cli.command.inspect import inspect as look  # noqa: PLC0415
 
-    show(given.run, given.top)
+    look(given.run, given.top)
 
 
 def listing(word: str, words: list[str]) -> None:

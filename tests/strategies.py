@@ -4,7 +4,17 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from berteam_cli.outcomes import EVENTS, NOBODY, Lineups, Outcomes
+from berteam_cli.outcomes import EVENTS, NOBODY, Experience, Lineups, Outcomes
+
+UNSEEN = Experience(
+    np.zeros((0, 4), dtype=np.int64),
+    np.zeros((0, 4, 2, 1), dtype=np.float32),
+    np.zeros((0, 4, 1), dtype=np.int16),
+    np.zeros((0, 4, 1), dtype=np.float32),
+    np.zeros(0, dtype=np.int64),
+    np.zeros(0, dtype=np.bool_),
+)
+"""What is known of games that nobody watched."""
 
 
 def floats(size, low=-5.0, high=5.0):

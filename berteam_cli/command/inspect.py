@@ -34,6 +34,45 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
     return table
 
 
+def inspect(folder: Path, top: int) -> None:
+    """Prints the tables of a run, and where its distribution over teams is only sampled, what a search finds.
+
+    Args:
+        folder: of a run, or of a sweep, whose table is printed.
+        top: rows of each table.
+
+    Raises:
+        InputError: there is no run, or a table cannot be read.
+        RunError: it has no whole checkpoint to search.
+    """
+    show(folder, top)
+    teams = read_table(folder, "team_distribution")
+    if teams is not None and (teams.team == "other").any() and (folder / "checkpoint").exists():
+        Console(width=None if Console().is_terminal else 120).print(searched(folder, top))
+
+
+def searched(folder: Path, top: int) -> Table:
+    """Returns the most probable teams that a search in the last checkpoint of a run finds.
+
+    Raises:
+        InputError: the run is of another version.
+        RunError: it has no whole checkpoint.
+    """
+    from berteam_cli import build, checkpoint  # noqa: PLC0415 (torch is not needed for tables)
+    from berteam_cli.config import checked  # noqa: PLC0415
+    from berteam_cli.records import team_names  # noqa: PLC0415
+    from berteam_cli.stored import stored_config  # noqa: PLC0415
+    from berteam_cli.training import RECORDS, generator  # noqa: PLC0415
+
+    parts = build.parts_to_read(checked(stored_config(folder)))
+    run = checkpoint.load(folder, parts).run
+    found = parts.selector.likeliest(run.selection, top, generator(parts.seed, RECORDS, run.epoch))
+    errors = [0.0] * len(found.teams) if found.error is None else found.error
+    columns = {"team": team_names(found.teams), "probability": found.probability, "error": errors}
+    frame = pd.DataFrame(columns).sort_values("probability", ascending=False, kind="stable")
+    return printed(f"Most probable teams that a beam search finds after epoch {run.epoch}", frame)
+
+
 def show(folder: Path, top: int) -> None:
     """Prints what came of the run in ``folder``: figures, strongest teams, most probable teams, members.
 
@@ -84,5 +123,11 @@ def text(value: object) -> str:
     if isinstance(value, float):
         if pd.isna(value):
             return ""
-        return f"{value:.4f}" if abs(value) < 10 else f"{value:,.1f}"
+        return (
+            f"{value:,.1f}"
+            if abs(value) >= 10
+            else f"{value:.4f}"
+            if abs(value) >= 1e-3 or not value
+            else f"{value:.2e}"
+        )
     return str(value)

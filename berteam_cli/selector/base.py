@@ -205,17 +205,6 @@ def orderings(teams: Ints) -> Floats:
     return math.factorial(size) / counts
 
 
-def log_orderings(teams: Ints) -> Floats:
-    """Returns (K,) ln of ``orderings``, for teams of any size."""
-    size = teams.shape[1]
-    counts = np.zeros(len(teams))
-    run = np.ones(len(teams))
-    for place in range(1, size):
-        run = np.where(teams[:, place] == teams[:, place - 1], run + 1, 1)
-        counts += np.log(run)
-    return math.lgamma(size + 1) - counts
-
-
 SAMPLES = 20_000  # teams drawn where they are too many to list
 PLACES_ASKED = 200_000  # or fewer, where teams are large: a drawn team costs a network T^2 places
 

@@ -11,6 +11,7 @@ from berteam_cli.selector.chances import unordered_chances
 from berteam_cli.selector.filling import Odds
 
 NARROWEST = 200  # partial teams that are followed, at least
+CANDIDATES = 100_000  # ways to fill one more place that are looked at, at most, the likeliest
 
 
 def likeliest(
@@ -67,7 +68,7 @@ def grown(odds: Odds, teams: Ints, reach: Floats, source: int, width: int, *, me
     open_ = teams == OPEN
     flow = odds(teams, np.full(len(teams), source)) * (reach / open_.sum(axis=1))[:, np.newaxis, np.newaxis]
     flow = np.where(open_[:, :, np.newaxis], flow, 0.0)
-    likely = np.argsort(-flow, axis=None, kind="stable")[: 8 * width]  # several of them may be the same team
+    likely = np.argsort(-flow, axis=None, kind="stable")[:CANDIDATES]  # several of them may be the same team
     row, place, member = np.unravel_index(likely, flow.shape)
     after = teams[row]
     after[np.arange(len(after)), place] = member

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.outcomes import OPEN, Floats, Ints
-from berteam_cli.selector.base import Field, log_orderings, orderings, unordered_teams
-from berteam_cli.selector.filling import Odds, distinct_rows
+from berteam_cli.selector.base import Field, orderings, unordered_teams
+from berteam_cli.selector.filling import Odds, distinct_rows, drawn
 
 LARGEST_SUMMED = 8  # T; the exact chance of one team is a sum over 2^T partial teams
 LARGEST_ARRANGED = 4  # T; that of an unordered one is a sum over T! arrangements, unless all places are alike
@@ -109,11 +109,41 @@ def unordered_chances(
         for order in arrangements:
             chance += np.exp(log_chances(odds, teams[:, order], known, opening))
         return chance * orderings(teams) / len(arrangements), np.zeros(count)
-    draws = 4 * ORDERS
-    arranged = rng.permuted(np.tile(teams, (draws, 1)), axis=1)
-    along = in_some_orders(odds, arranged, np.tile(known, draws), opening, 1, rng).reshape(draws, count)
-    chances = np.exp(along + log_orderings(teams))
-    return chances.mean(axis=0), chances.std(axis=0, ddof=1) / np.sqrt(draws)
+    along = np.exp([log_chance_on_the_way(odds, teams, known, rng) for _ in range(4 * ORDERS)])
+    return along.mean(axis=0), along.std(axis=0, ddof=1) / np.sqrt(len(along))
+
+
+def log_chance_on_the_way(odds: Odds, teams: Ints, known: Ints, rng: Generator) -> Floats:
+    """Returns (K,) ln of an estimate of the chance of each of the unordered ``teams``, from filling it once.
+
+    The places are filled in a random order, each with one of the members of the team that are left, drawn in proportion
+    to their conditionals there. The product of the sums of those conditionals is right in the mean (sequential
+    importance sampling), and varies little where the network knows which member belongs where.
+
+    Args:
+        odds: what all places are drawn from.
+        teams: (K, T) members in ascending order.
+        known: (K,) as of Odds.
+        rng: the only source of chance.
+    """
+    count, size = teams.shape
+    rows, same = np.arange(count), teams[:, :, np.newaxis] == teams[:, np.newaxis]
+    order = rng.permuted(np.tile(np.arange(size), (count, 1)), axis=1)
+    left, partial, log_chance = np.ones((count, size), dtype=np.bool_), np.full_like(teams, OPEN), np.zeros(count)
+    for step in range(size):
+        place = order[:, step]
+        chances = np.empty((count, size))
+        for begin in range(0, count, ROWS):
+            part = rows[begin : begin + ROWS]
+            asked = odds(partial[part], known[part])[np.arange(len(part)), place[part]]
+            chances[part] = np.take_along_axis(asked, teams[part], axis=1)
+        copies = (same & left[:, np.newaxis]).sum(axis=2)  # a member that is left twice is one choice
+        chances = np.where(left, chances / np.maximum(copies, 1), 0.0)
+        log_chance += np.log(chances.sum(axis=1))
+        chosen = drawn(np.maximum(chances, left * np.finfo(np.float64).tiny), rng)
+        partial[rows, place] = teams[rows, chosen]
+        left[rows, chosen] = False
+    return log_chance
 
 
 def from_nobody(odds: Odds, size: int, source: int) -> Floats:

@@ -25,9 +25,7 @@ def allowed(places: object, islands: Sequence[str], island_of: Ints, team_size: 
     """
     if not isinstance(places, list) or len(places) != team_size:
         said = f"has {len(places)}" if isinstance(places, list) else f"is {places}"
-        raise ValueError(
-            f"selector.valid_members must be a list with an entry for each of {team_size} places, but {said}."
-        )
+        raise ValueError(f"selector.valid_members must have an entry for each of the {team_size} places, but {said}.")
     rows = np.zeros((team_size, len(island_of)), dtype=np.bool_)
     for place, entry in enumerate(places):
         key = f"selector.valid_members[{place}]"

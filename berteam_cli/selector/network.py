@@ -60,6 +60,10 @@ class TeamNetwork(nn.Module):
         self.members = members
         self.reader = Reader(layers, width, heads, dropout, sides, embedder)
         self.writer = Writer(members, team_size, layers, width, heads, dropout, position)
+        for stack in (self.reader.encoder, self.writer.decoder):  # as torch.nn.Transformer does
+            for weight in stack.parameters():
+                if weight.dim() > 1:
+                    nn.init.xavier_uniform_(weight)
 
     def forward(
         self, teams: Tensor, sides: Tensor, rows: Tensor | None = None, lengths: Tensor | None = None

@@ -11,7 +11,9 @@ from berteam_cli.selector.base import Field, orderings, unordered_teams
 from berteam_cli.selector.berteam import Berteam
 from berteam_cli.selector.captains import SCHEMES, opening
 from berteam_cli.selector.chances import log_chances
-from berteam_cli.selector.filling import noise
+from berteam_cli.selector.filling import noise, proposal
+from berteam_cli.selector.observations import Looking
+from tests.strategies import UNSEEN
 
 torch.set_num_threads(1)
 
@@ -33,19 +35,36 @@ SMALL = {
     "heads": 2,
     "dropout": 0.1,
     "position": "append",
+    "side": "shared",
+    "dataset": "shared",
+    "observations": Looking("none", 10, 0.5, 0.1, "lstm", 2, 0, 0),
 }
 
 
-def made(members=4, team_size=2, **settings):
-    return Berteam(field=Field(np.zeros(members, dtype=np.int64), team_size), **SMALL | settings)
+def made(members=4, team_size=2, sides=2, valid=None, limit=5000, **settings):
+    field = Field(np.zeros(members, dtype=np.int64), team_size, sides, valid, limit)
+    return Berteam(field=field, **SMALL | settings)
 
 
 def begun(selector, seed=0, sharper=4.0):
     """Returns a state whose network has clear opinions, as if it had learnt something."""
     state = selector.init(np.random.default_rng(seed))
-    weights = dict(state.learnt.weights)
-    weights["head.weight"] = weights["head.weight"] * sharper
-    return replace(state, learnt=replace(state.learnt, weights=weights))
+    learnt = []
+    for network in state.learnt:
+        weights = dict(network.weights)
+        weights["writer.head.weight"] = weights["writer.head.weight"] * sharper
+        learnt.append(replace(network, weights=weights))
+    return replace(state, learnt=tuple(learnt))
+
+
+def odds_of(selector, state, sources=1):
+    """Returns the network's conditionals as a function of partial teams alone."""
+    odds = selector._odds(state, np.arange(sources))
+    return lambda teams, known=0: odds(teams, np.full(len(teams), known))
+
+
+def learn(selector, state, outcomes, rng, seen=UNSEEN):
+    return selector.learn(state, outcomes, seen, np.zeros(selector.field.members), rng)
 
 
 def played(lineups, wins, seed=0):
@@ -69,9 +88,10 @@ def same_winner(selector, team, games=20):
 
 def chances_of(selector, state, teams, ages):
     """Returns the chance that ``select`` makes each of ``teams``."""
-    odds, doubt = selector._odds(state), noise(ages, selector.noise_half_life)
-    first = opening(selector.captain, odds(np.full((1, selector.field.team_size), OPEN))[0], doubt)
-    return np.exp(log_chances(odds, teams, first, doubt))
+    odds, doubt = selector._odds(state, np.array([0])), noise(ages, selector.noise_half_life)
+    field, known = selector.field, np.zeros(len(teams), dtype=int)
+    first = opening(selector.captain, odds(np.full((1, field.team_size), OPEN), known[:1]), doubt, field.allowed)
+    return np.exp(log_chances(proposal(odds, doubt, field.allowed), teams, known, first))
 
 
 def ordered(selector, state):
@@ -131,11 +151,11 @@ def test_captains_stand_where_the_network_likes_them():
     selector = made(2, 2, captain="uniform", noise_half_life=0.0)
     state = begun(selector, sharper=8.0)
     for member in range(2):  # teams of old member captains: the other place is filled by the network
-        first = selector._odds(state)(np.array([[OPEN, OPEN]]))[0][:, member]
+        first = odds_of(selector, state)(np.array([[OPEN, OPEN]]))[0][:, member]
         expected = first[0] / first.sum()
         lineups = selector.select(state, 4000, np.full(2, 10**6), np.random.default_rng(0))
         teams = lineups.teams.reshape(-1, 2)[lineups.captains.ravel() == member]
-        then = selector._odds(state)(np.array([[member, OPEN], [OPEN, member]]))
+        then = odds_of(selector, state)(np.array([[member, OPEN], [OPEN, member]]))
         at_first = expected * then[0, 1, 1 - member]  # captain at place 0 and the other behind
         share = np.mean((teams[:, 0] == member) & (teams[:, 1] != member))
         assert abs(share - at_first) < 5 * 0.5 / np.sqrt(len(teams))
@@ -144,9 +164,9 @@ def test_captains_stand_where_the_network_likes_them():
 def test_new_members_fill_places_the_network_would_not_give_them():
     selector = made(4, 2, captain="uniform")
     state = begun(selector)
-    learnt, _ = selector.learn(state, same_winner(selector, [1, 1]), np.random.default_rng(0))
+    learnt, _ = learn(selector, state, same_winner(selector, [1, 1]), np.random.default_rng(0))
     for epoch in range(60):
-        learnt, _ = selector.learn(learnt, same_winner(selector, [1, 1]), np.random.default_rng(epoch))
+        learnt, _ = learn(selector, learnt, same_winner(selector, [1, 1]), np.random.default_rng(epoch))
     old, new = (selector.select(learnt, 3000, np.full(4, age), np.random.default_rng(1)) for age in (10**6, 0))
     shares = [np.bincount(lineups.teams.ravel(), minlength=4) / lineups.teams.size for lineups in (old, new)]
     assert shares[0][1] > 0.5  # half of the captains are given, the rest is mostly member 1
@@ -165,7 +185,7 @@ def test_chance_comes_from_the_generator_alone():
         rng = np.random.default_rng(3)
         state = selector.init(rng)
         lineups = selector.select(state, 10, np.zeros(5), rng)
-        state, _ = selector.learn(state, played(lineups, np.full((25, 25), 0.5)), rng)
+        state, _ = learn(selector, state, played(lineups, np.full((25, 25), 0.5)), rng)
         runs.append((lineups.teams.tobytes(), lineups.log_chances.tobytes(), byte_string(selector, state)))
     assert (torch.rand(1), np.random.rand()) == expected  # noqa: NPY002
     assert runs[0] == runs[1]
@@ -207,7 +227,7 @@ def test_captains_are_the_mean_first_choice():
     np.testing.assert_allclose(selector.captains(state), selector.distribution(state).probability)
     selector = made(5, 3)
     state = begun(selector)
-    first = selector._odds(state)(np.full((1, 3), OPEN))[0]
+    first = odds_of(selector, state)(np.full((1, 3), OPEN))[0]
     np.testing.assert_allclose(selector.captains(state), first.sum(axis=0) / 3)
 
 
@@ -218,7 +238,7 @@ def test_any_population_and_any_team_size(scheme, members, size):
     rng = np.random.default_rng(0)
     state = selector.init(rng)
     lineups = selector.select(state, 3, np.zeros(members), rng)
-    state, did = selector.learn(state, scored(lineups, np.tile([0.0, 1.0], (3, 1))), rng)
+    state, did = learn(selector, state, scored(lineups, np.tile([0.0, 1.0], (3, 1))), rng)
     assert did.updates == 4
     np.testing.assert_allclose(selector.distribution(state).probability.sum(), 1.0)
     assert selector.sample(state, 7, rng).shape == (7, size)
@@ -233,12 +253,12 @@ def test_updates_come_every_so_many_epochs():
     state, rng = selector.init(np.random.default_rng(0)), np.random.default_rng(1)
     updates = []
     for _ in range(7):
-        state, did = selector.learn(state, same_winner(selector, [0, 1]), rng)
+        state, did = learn(selector, state, same_winner(selector, [0, 1]), rng)
         updates.append(did.updates)
         assert np.isnan(did.loss) == (did.updates == 0)
     assert updates == [0, 0, 4, 0, 0, 4, 0]
     assert did.buffer == 100
-    assert state.learnt.steps == 8
+    assert state.learnt[0].steps == 8
 
 
 def test_without_any_winner_there_is_no_update():
@@ -246,23 +266,23 @@ def test_without_any_winner_there_is_no_update():
     state, rng = selector.init(np.random.default_rng(0)), np.random.default_rng(1)
     lineups = selector.select(state, 5, np.zeros(4), rng)
     draws = scored(lineups, np.full((5, 2), 0.5))
-    after, did = selector.learn(state, draws, rng)
+    after, did = learn(selector, state, draws, rng)
     assert (did.updates, did.buffer) == (0, 0)
     assert np.isnan(did.loss)
     assert after.learnt is state.learnt
     assert after.epochs == 1
-    after, did = replace(selector, draw_weight=0.5).learn(state, draws, rng)
+    after, did = learn(replace(selector, draw_weight=0.5), state, draws, rng)
     assert (did.updates, did.buffer) == (4, 10)
-    assert set(after.winners.weights[:10]) == {0.5}
+    assert set(after.winners[0].held.weights[:10]) == {0.5}
 
 
 def test_the_state_handed_in_stays():
     selector = made(weighting=True)
     rng = np.random.default_rng(0)
     state = selector.init(rng)
-    state, _ = selector.learn(state, same_winner(selector, [0, 1]), rng)
+    state, _ = learn(selector, state, same_winner(selector, [0, 1]), rng)
     before = byte_string(selector, state)
-    after, _ = selector.learn(state, same_winner(selector, [2, 1]), rng)
+    after, _ = learn(selector, state, same_winner(selector, [2, 1]), rng)
     assert byte_string(selector, state) == before
     assert byte_string(selector, after) != before
 
@@ -271,7 +291,7 @@ def test_a_single_winner_becomes_almost_certain():
     selector = made()
     state = selector.init(np.random.default_rng(0))
     for epoch in range(80):
-        state, _ = selector.learn(state, same_winner(selector, [3, 1]), np.random.default_rng(epoch))
+        state, _ = learn(selector, state, same_winner(selector, [3, 1]), np.random.default_rng(epoch))
     total = selector.distribution(state)
     assert total.probability[np.all(total.teams == [1, 3], axis=1)] > 0.9
 
@@ -282,7 +302,7 @@ def test_a_restored_state_goes_on_as_if_nothing_had_happened():
     state = selector.init(rng)
     for _ in range(3):
         lineups = selector.select(state, 6, np.arange(4), rng)
-        state, _ = selector.learn(state, played(lineups, np.full((16, 16), 0.5)), rng)
+        state, _ = learn(selector, state, played(lineups, np.full((16, 16), 0.5)), rng)
     saved = {name: value.clone() for name, value in selector.tensors(state).items()}
     other = made(weighting=True)
     again = other.restored(saved)
@@ -294,8 +314,8 @@ def test_a_restored_state_goes_on_as_if_nothing_had_happened():
         assert np.array_equal(lineups.teams, same.teams)
         assert np.array_equal(lineups.log_chances, same.log_chances)
         outcomes = played(lineups, np.full((16, 16), 0.5))
-        state, _ = selector.learn(state, outcomes, np.random.default_rng(6))
-        again, _ = other.learn(again, outcomes, np.random.default_rng(6))
+        state, _ = learn(selector, state, outcomes, np.random.default_rng(6))
+        again, _ = learn(other, again, outcomes, np.random.default_rng(6))
         assert byte_string(other, again) == byte_string(selector, state)
 
 
@@ -340,7 +360,7 @@ def test_weighting_fits_win_rates_and_no_weighting_the_replicator(weighting):
     state = start
     for epoch in range(12):
         slower = replace(selector, learning_rate=2e-3 if epoch < 8 else 2e-4)
-        state, _ = slower.learn(state, outcomes, np.random.default_rng(epoch))
+        state, _ = learn(slower, state, outcomes, np.random.default_rng(epoch))
     assert far(ordered(selector, state), fit[weighting]) < 0.05
 
 
@@ -353,7 +373,7 @@ def test_weighted_learning_settles_where_shares_are_win_rates():
     assert far(ordered(selector, state), fixed) > 0.2
     for epoch in range(60):
         lineups = selector.select(state, 2000, np.zeros(4), rng)
-        state, _ = selector.learn(state, played(lineups, wins, seed=epoch), rng)
+        state, _ = learn(selector, state, played(lineups, wins, seed=epoch), rng)
     assert far(ordered(selector, state), fixed) < 0.05
 
 
@@ -365,7 +385,8 @@ def test_weighted_learning_settles_where_shares_are_win_rates():
     [
         ({"captain": "alphabetical"}, "selector.captain"),
         ({"position": "sideways"}, "selector.position"),
-        ({"weighting": True, "team_size": 9}, "selector.weighting"),
+        ({"side": "upside"}, "selector.side"),
+        ({"side": "separate"}, "selector.dataset"),
         ({"minibatch_size": 48}, "selector.minibatch_size"),
         ({"heads": 3}, "selector.width"),
         ({"width": 9, "heads": 3}, "selector.width"),

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from berteam_cli.outcomes import OPEN
-from berteam_cli.selector.filling import drawn, filled, noise, towards_uniform
+from berteam_cli.selector.filling import drawn, filled, noise, proposal, towards_uniform, within
 
 
 def test_noise_by_hand():
@@ -54,11 +54,11 @@ def test_property_held_places_stay_and_open_ones_get_members(members, size, seed
     teams[open_] = OPEN
     before = teams.copy()
 
-    def odds(partial):
+    def odds(partial, known):
         assert np.all((partial >= OPEN) & (partial < members))
         return rng.dirichlet(np.ones(members), size=partial.shape)
 
-    full = filled(odds, teams, np.zeros(members), rng)
+    full = filled(odds, teams, np.zeros(5, dtype=int), rng)
     assert np.array_equal(full[~open_], before[~open_])
     assert np.all((full >= 0) & (full < members))
     assert np.array_equal(teams, before)
@@ -67,34 +67,58 @@ def test_property_held_places_stay_and_open_ones_get_members(members, size, seed
 def test_the_network_is_asked_once_per_place_and_never_twice_about_one_team():
     asked = []
 
-    def odds(partial):
-        assert len(np.unique(partial, axis=0)) == len(partial)
+    def odds(partial, known):
+        assert len(np.unique(np.column_stack([known, partial]), axis=0)) == len(partial)
         asked.append(len(partial))
         return np.full((*partial.shape, 4), 0.25)
 
-    filled(odds, np.full((1000, 3), OPEN), np.zeros(4), np.random.default_rng(0))
+    filled(odds, np.full((1000, 3), OPEN), np.zeros(1000, dtype=int), np.random.default_rng(0))
     assert asked == [1, 3 * 4, 3 * 4 * 4]
 
 
 def test_every_order_of_filling_is_equally_likely():
     # Member k is the k-th to come, so a team tells the order it was filled in.
-    def odds(partial):
+    def odds(partial, known):
         step = (partial != OPEN).sum(axis=1)
         return np.repeat(np.eye(3)[step][:, np.newaxis], 3, axis=1)
 
-    teams = filled(odds, np.full((30_000, 3), OPEN), np.zeros(3), np.random.default_rng(1))
+    teams = filled(odds, np.full((30_000, 3), OPEN), np.zeros(30_000, dtype=int), np.random.default_rng(1))
     orders, counts = np.unique(teams, axis=0, return_counts=True)
     assert len(orders) == 6
     np.testing.assert_allclose(counts / 30_000, 1 / 6, atol=5 * np.sqrt(5 / 36 / 30_000))
 
 
 def test_noise_is_applied_to_every_place():
-    def odds(partial):
+    def odds(partial, known):
         return np.broadcast_to(np.eye(4)[0], (*partial.shape, 4)).copy()
 
     doubt = np.array([0.5, 0.25, 0, 0])
     expected = towards_uniform(np.eye(4)[0], doubt)
-    teams = filled(odds, np.full((20_000, 2), OPEN), doubt, np.random.default_rng(2))
+    doubted = proposal(odds, doubt, np.ones((2, 4), dtype=np.bool_))
+    teams = filled(doubted, np.full((20_000, 2), OPEN), np.zeros(20_000, dtype=int), np.random.default_rng(2))
     for place in range(2):
         share = np.bincount(teams[:, place], minlength=4) / 20_000
         np.testing.assert_allclose(share, expected, atol=5 * 0.5 / np.sqrt(20_000))
+
+
+def test_what_is_known_of_each_team_reaches_the_network_with_it():
+    def odds(partial, known):
+        return np.repeat(np.eye(3)[known][:, np.newaxis], 2, axis=1)
+
+    known = np.array([2, 0, 1, 2])
+    teams = filled(odds, np.full((4, 2), OPEN), known, np.random.default_rng(0))
+    np.testing.assert_array_equal(teams, np.repeat(known[:, np.newaxis], 2, axis=1))
+
+
+def test_within_the_rules_by_hand():
+    allowed = np.array([[True, False, True], [False, True, False]])
+    odds = np.array([[0.2, 0.5, 0.3], [0.6, 0.0, 0.4]])
+    np.testing.assert_allclose(within(odds, allowed), [[0.4, 0, 0.6], [0, 1, 0]])
+    assert within(odds, np.ones((2, 3), dtype=np.bool_)) is odds
+
+
+def test_noise_comes_before_the_rules():
+    doubt, allowed = np.array([1.0, 0.0, 0.0]), np.array([[True, True, False]])
+    odds = proposal(lambda teams, known: np.array([[[0.0, 0.2, 0.8]]]), doubt, allowed)
+    # 1/3 : 0.2 : 0.8 after the noise, of which the first two are left.
+    np.testing.assert_allclose(odds(np.array([[OPEN]]), np.array([0]))[0, 0], [5 / 8, 3 / 8, 0])

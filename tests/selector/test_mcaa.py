@@ -6,14 +6,15 @@ from hypothesis import strategies as st
 
 from berteam_cli.selector.base import Field
 from berteam_cli.selector.mcaa import Mcaa, McaaState
-from tests.strategies import floats, outcomes
+from tests.strategies import UNSEEN, floats, outcomes
 
 ISLANDS = np.array([0, 0, 1, 2, 2, 2])
+FITNESS = np.zeros(6)
 RNG = np.random.default_rng(0)
 
 
-def mcaa(train_every=1, learning_rate=0.2, team_size=2):
-    return Mcaa(Field(ISLANDS, team_size), learning_rate, train_every)
+def mcaa(train_every=1, learning_rate=0.2, team_size=2, valid=None):
+    return Mcaa(Field(ISLANDS, team_size, valid=valid), learning_rate, train_every)
 
 
 @given(floats(3), st.integers(0, 2**32))
@@ -22,7 +23,7 @@ def test_the_step_is_the_gradient_of_half_the_squared_error(logits, seed):
     rng = np.random.default_rng(seed)
     teams = rng.integers(6, size=(5, 2, 2))
     games = outcomes(teams, np.tile([1.0, 0], (5, 1)))
-    learnt, _ = mcaa().learn(McaaState(logits, np.zeros(3, dtype=int), 0), games, RNG)
+    learnt, _ = mcaa().learn(McaaState(logits, np.zeros(3, dtype=int), 0), games, UNSEEN, FITNESS, RNG)
 
     theta = torch.tensor(logits, requires_grad=True)
     q = torch.tensor(np.bincount(ISLANDS[teams[:, 0].ravel()], minlength=3) / 10)
@@ -54,12 +55,12 @@ def test_only_winners_count_and_only_every_so_many_epochs():
     selector = mcaa(train_every=2)
     state = selector.init(RNG)
     games = outcomes([[[2, 2], [0, 0]], [[0, 1], [3, 3]]], [[1, 0], [0.5, 0.5]])
-    once, said = selector.learn(state, games, RNG)
+    once, said = selector.learn(state, games, UNSEEN, FITNESS, RNG)
     np.testing.assert_array_equal(once.logits, 0)
     np.testing.assert_array_equal(once.wins, [0, 2, 0])
     assert said.updates == 0
     assert said.buffer == 1
-    twice, said = selector.learn(once, outcomes([[[4, 4], [0, 0]]], [[1, 0]]), RNG)
+    twice, said = selector.learn(once, outcomes([[[4, 4], [0, 0]]], [[1, 0]]), UNSEEN, FITNESS, RNG)
     assert said.updates == 1
     assert twice.logits[0] < 0
     assert twice.logits[1] == pytest.approx(twice.logits[2])
@@ -69,7 +70,7 @@ def test_only_winners_count_and_only_every_so_many_epochs():
 
 def test_no_wins_no_step():
     drawn = outcomes([[[0, 0], [2, 2]]], [[0.5, 0.5]])
-    after, said = mcaa().learn(mcaa().init(RNG), drawn, RNG)
+    after, said = mcaa().learn(mcaa().init(RNG), drawn, UNSEEN, FITNESS, RNG)
     np.testing.assert_array_equal(after.logits, 0)
     assert said.updates == 0
 
@@ -88,3 +89,15 @@ def test_tensors_and_back():
     np.testing.assert_array_equal(again.logits, state.logits)
     np.testing.assert_array_equal(again.wins, state.wins)
     assert again.epochs == 5
+
+
+def test_rules_are_kept_and_shares_hold_among_who_may_stand_there():
+    allowed = np.array([[True, True, True, False, False, False], [False, False, False, True, True, False]])
+    selector, state = mcaa(valid=allowed), McaaState(np.log([0.5, 0.2, 0.3]), np.zeros(3, dtype=int), 0)
+    first = np.array([0.25, 0.25, 0.2]) / 0.7
+    found = selector.distribution(state)
+    by_team = dict(zip(map(tuple, found.teams), found.probability, strict=True))
+    assert by_team == pytest.approx({(a, b): first[a] / 2 for a in range(3) for b in (3, 4)})
+    lineups = selector.select(state, 200, np.zeros(6, dtype=int), np.random.default_rng(0))
+    assert allowed[np.arange(2), lineups.teams].all()
+    np.testing.assert_allclose(np.exp(lineups.log_chances), first[lineups.teams[:, :, 0]] / 2)

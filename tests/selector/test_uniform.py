@@ -9,8 +9,8 @@ from berteam_cli.selector.uniform import Uniform
 AGES = np.zeros(5, dtype=int)
 
 
-def uniform(captain="matching", members=5, team_size=2):
-    return Uniform(Field(np.zeros(members, dtype=int), team_size), captain)
+def uniform(captain="matching", members=5, team_size=2, limit=5000, valid=None):
+    return Uniform(Field(np.zeros(members, dtype=int), team_size, valid=valid, exact_limit=limit), captain)
 
 
 @pytest.mark.parametrize("captain", ["matching", "uniform"])
@@ -49,12 +49,42 @@ def test_orderings_by_hand():
 
 
 def test_too_many_teams_are_sampled():
-    exact = measured(uniform(), None, 15, np.random.default_rng(0))
+    exact = measured(uniform(limit=15), None, np.random.default_rng(0))
     assert exact.samples == 0
     assert exact.other == 0
-    sampled = measured(uniform(), None, 14, np.random.default_rng(0))
+    sampled = measured(uniform(limit=14), None, np.random.default_rng(0))
     assert len(sampled.teams) == 14
     assert sampled.samples > 0
     assert sampled.probability.sum() + sampled.other == pytest.approx(1)
     known = dict(zip(map(tuple, exact.teams), exact.probability, strict=True))
     np.testing.assert_allclose(sampled.probability, [known[tuple(t)] for t in sampled.teams], atol=0.01)
+
+
+def test_rules_are_kept_and_chances_are_those_of_who_is_drawn():
+    allowed = np.array([[True, True, False], [False, True, True]])
+    selector = uniform(members=3, valid=allowed)
+    lineups = selector.select(None, 20_000, np.zeros(3, dtype=int), np.random.default_rng(0))
+    teams = lineups.teams.reshape(-1, 2)
+    assert allowed[np.arange(2), teams].all()
+    # Captain 0 or 2 (a third each) leaves two for the other place, captain 1 stands at either.
+    share = {(0, 1): 1 / 6 + 1 / 12, (0, 2): 1 / 6 + 1 / 6, (1, 1): 1 / 12 + 1 / 12, (1, 2): 1 / 6 + 1 / 12}
+    for team, chance in share.items():
+        these = (teams == team).all(axis=1)
+        assert abs(these.mean() - chance) < 5 * 0.5 / np.sqrt(len(teams))
+        np.testing.assert_allclose(lineups.log_chances.ravel()[these], math.log(chance))
+    found = selector.distribution(None)
+    np.testing.assert_array_equal(found.teams, [[0, 1], [0, 2], [1, 1], [1, 2]])
+    np.testing.assert_allclose(found.probability, 0.25)
+
+
+def test_errors_of_a_sampled_distribution_are_those_of_shares():
+    sampled = measured(uniform(limit=14), None, np.random.default_rng(0))
+    p = sampled.probability
+    np.testing.assert_allclose(sampled.error, np.sqrt(p * (1 - p) / sampled.samples))
+
+
+def test_large_teams_are_searched_without_listing():
+    found = uniform(members=50, team_size=6).likeliest(None, 5, np.random.default_rng(0))
+    assert len(found.teams) == 5
+    # Six different members stand in 720 orders: no team is more likely.
+    np.testing.assert_allclose(found.probability, 720 / 50.0**6)
