@@ -19,6 +19,7 @@ Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 OPEN = -1  # a place nobody holds yet
+ABSENT = -2  # no place at all, where teams of several sizes share an array
 NOBODY = -1  # no captain, no parent
 
 EVENTS = ("captures", "grabs", "tags", "wall_hits")  # what a game counts for each side

@@ -31,9 +31,10 @@ from berteam_cli.selector.chances import (
     log_chances,
     total_distribution,
 )
+from berteam_cli.selector.embedders import Embedder, embedder
 from berteam_cli.selector.filling import Odds, drawn, filled, noise, proposal
 from berteam_cli.selector.masking import masking_loss
-from berteam_cli.selector.network import POSITIONS, TeamNetwork, by_owner, odds_of, seeded
+from berteam_cli.selector.network import LONGEST, POSITIONS, TeamNetwork, by_owner, odds_of, seeded
 from berteam_cli.selector.observations import Looking, Seen, nothing_seen, seen_in
 from berteam_cli.selector.updates import untrained, updated
 from berteam_cli.selector.winners import Examples, Winners, harvest, minibatch, no_winners, pushed
@@ -97,6 +98,10 @@ class Berteam:
         for name, allowed in (("captain", SCHEMES), ("position", POSITIONS), ("side", KNOWING)):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"selector.{name} must be one of {', '.join(allowed)}, but is {getattr(self, name)}.")
+        if not 1 <= self.field.team_size <= LONGEST:
+            raise ValueError(
+                f"team_size must be 1 to {LONGEST}, the longest a network reads, but is {self.field.team_size}."
+            )
         if self.side == "separate" and self.dataset == "shared":
             raise ValueError("selector.side=separate needs selector.dataset=per_side: a network learns from its side.")
         if self.batch_size % self.minibatch_size:
@@ -154,7 +159,8 @@ class Berteam:
         games = np.arange(len(lineups))
         chooser = games % self.field.sides
         looked = self._seen(seen, len(lineups))[games, chooser]
-        new = self._chosen(self._odds(state, chooser, looked), games[:, np.newaxis], ages, rng)
+        side = chooser if self.by_side else np.zeros_like(chooser)
+        new = self._chosen(self._odds(state, side, looked), games[:, np.newaxis], ages, rng)
         teams, leaders = lineups.teams.copy(), lineups.captains.copy()
         chances = np.full(leaders.shape, np.nan)
         teams[games, chooser], leaders[games, chooser] = new.teams[:, 0], new.captains[:, 0]
@@ -284,8 +290,13 @@ class Berteam:
                 self.dropout,
                 self.position,
                 field.sides if self.side == "token" else 1,
-                None,
+                self._embedder() if self.observes else None,
             )
+
+    def _embedder(self) -> Embedder:
+        """Returns what makes one token of what a member saw, with random weights."""
+        looking = self.observations
+        return embedder(looking.embed, looking.numbers, self.width, self.heads, looking.lstm_layers, self.dropout)
 
     def _loss(self, network: Callable[..., Tensor], examples: Examples, rng: Generator) -> Tensor:
         """Returns what an update goes down."""

@@ -74,8 +74,8 @@ def in_some_orders(odds: Odds, teams: Ints, known: Ints, opening: Floats, orders
         partial[rows, before] = teams[rows, before]
         for begin in range(0, len(teams), ROWS):
             part = rows[begin : begin + ROWS]
-            asked = odds(partial[part], known[part])
-            log_chance[part] += np.log(asked[np.arange(len(part)), place[part], teams[part, place[part]]])
+            asked = odds(partial[part], known[part], place[part])
+            log_chance[part] += np.log(asked[np.arange(len(part)), teams[part, place[part]]])
     return log_chance.reshape(orders, -1)
 
 
@@ -135,7 +135,7 @@ def log_chance_on_the_way(odds: Odds, teams: Ints, known: Ints, rng: Generator) 
         chances = np.empty((count, size))
         for begin in range(0, count, ROWS):
             part = rows[begin : begin + ROWS]
-            asked = odds(partial[part], known[part])[np.arange(len(part)), place[part]]
+            asked = odds(partial[part], known[part], place[part])
             chances[part] = np.take_along_axis(asked, teams[part], axis=1)
         copies = (same & left[:, np.newaxis]).sum(axis=2)  # a member that is left twice is one choice
         chances = np.where(left, chances / np.maximum(copies, 1), 0.0)

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.outcomes import OPEN, Bools, Floats, Ints
 
-Odds = Callable[[Ints, Ints], Floats]
-"""Chances of each member at each place of partial teams, (K, T, N), last axis summing to 1.
 
-Called with the teams (K, T), OPEN where nobody stands yet, and (K,) the index of what else is known for each team: of
-the side it plays, or of what was seen of its opponent.
-"""
+class Odds(Protocol):
+    """Chances of each member at the places of partial teams."""
+
+    def __call__(self, teams: Ints, known: Ints, places: Ints | None = None) -> Floats:
+        """Returns (K, T, N) chances of each member at each place, or (K, N) at one place of each team.
+
+        Args:
+            teams: (K, T), OPEN where nobody stands yet.
+            known: (K,) index of what else is known for each team: the side it plays, or what was seen of its opponent.
+            places: (K,) the place asked about; None for all.
+        """
 
 
 def noise(ages: Ints, half_life: float) -> Floats:
@@ -47,7 +53,7 @@ def within(odds: Floats, allowed: Bools) -> Floats:
 
     Args:
         odds: chances of the members.
-        allowed: (T, N) who may stand at each place, at least one member for each.
+        allowed: (T, N), or of the shape of ``odds``, who may stand at each place, at least one member for each.
     """
     if allowed.all():
         return odds
@@ -65,8 +71,9 @@ def proposal(odds: Odds, noise: Floats, allowed: Bools) -> Odds:
         allowed: (T, N).
     """
 
-    def proposed(teams: Ints, known: Ints) -> Floats:
-        return within(towards_uniform(odds(teams, known), noise), allowed)
+    def proposed(teams: Ints, known: Ints, places: Ints | None = None) -> Floats:
+        there = allowed if places is None else allowed[places]
+        return within(towards_uniform(odds(teams, known, places), noise), there)
 
     return proposed
 
@@ -93,13 +100,14 @@ def filled(odds: Odds, teams: Ints, known: Ints, rng: Generator) -> Ints:
     rows = np.arange(len(teams))
     for _ in range(int((teams == OPEN).sum(axis=1).max(initial=0))):
         place = np.where(teams == OPEN, rng.random(teams.shape), -1.0).argmax(axis=1)
-        partial, sources, which = distinct_rows(teams, known)  # at first all teams are alike
-        chances = odds(partial, sources)[which, place]  # (K, N)
-        teams[rows, place] = drawn(chances, rng)
+        # At first all teams are alike; the place stands before the team, for distinct rows of both.
+        asked, sources, which = distinct_rows(np.column_stack([place, teams]), known)
+        chances = odds(np.ascontiguousarray(asked[:, 1:]), sources, asked[:, 0])
+        teams[rows, place] = drawn(chances[which], rng)
     return teams
 
 
 def distinct_rows(teams: Ints, known: Ints) -> tuple[Ints, Ints, Ints]:
     """Returns the distinct rows of ``teams``, (K, T), with their ``known``, and (K,) which of them each row is."""
     unique, which = np.unique(np.column_stack([known, teams]), axis=0, return_inverse=True)
-    return unique[:, 1:], unique[:, 0], which.reshape(-1)
+    return np.ascontiguousarray(unique[:, 1:]), unique[:, 0].copy(), which.reshape(-1)

@@ -49,4 +49,8 @@ def top(chances: Floats, field: Field, count: int, rng: Generator, *, listed: bo
 
 def odds_of(chances: Floats) -> Odds:
     """Returns ``chances`` as conditionals that depend on nothing."""
-    return lambda teams, known: np.broadcast_to(chances, (len(teams), *chances.shape))
+
+    def odds(teams: Ints, known: Ints, places: Ints | None = None) -> Floats:
+        return np.broadcast_to(chances, (len(teams), *chances.shape)) if places is None else chances[places]
+
+    return odds

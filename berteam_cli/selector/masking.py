@@ -12,7 +12,7 @@ import torch
 from numpy.random import Generator
 from torch import Tensor
 
-from berteam_cli.outcomes import OPEN, Bools, Ints
+from berteam_cli.outcomes import ABSENT, OPEN, Bools, Ints
 from berteam_cli.selector.winners import Examples
 
 SHOWN_AS_MASK = 0.8  # of the hidden places; BERT's shares
@@ -22,21 +22,25 @@ SHOWN_AS_ANYONE = 0.1  # the rest is shown as it is
 def masked(teams: Ints, members: int, rng: Generator) -> tuple[Ints, Bools]:
     """Returns (K, T) teams as the network sees them and (K, T) which places it must guess.
 
-    Each team draws a share q from {0, 1/T, ..., 1}, each of its places is hidden with chance q, and one place,
-    chosen uniformly, in any case. So every number of hidden places, as it comes about in filling, is trained.
+    Each team draws a share q from {0, 1/T, ..., 1}, T being the number of its own places, each of them is hidden with
+    chance q, and one, chosen uniformly, in any case. So every number of hidden places, as it comes about in filling, is
+    trained. (The published code draws the shares of all teams of a minibatch from those of its first team.)
 
     Args:
-        teams: (K, T), no place OPEN.
+        teams: (K, T) members, ABSENT where a team has no place; no place OPEN.
         members: N.
         rng: the only source of chance.
     """
-    count, size = teams.shape
-    share = rng.integers(size + 1, size=(count, 1)) / size
-    hidden = rng.random((count, size)) < share
-    hidden[np.arange(count), rng.integers(size, size=count)] = True
+    own = teams != ABSENT
+    sizes = own.sum(axis=1)
+    share = rng.integers(sizes + 1) / sizes
+    hidden = rng.random(teams.shape) < share[:, np.newaxis]
+    forced = (np.cumsum(own, axis=1) > rng.integers(sizes)[:, np.newaxis]).argmax(axis=1)
+    hidden[np.arange(len(teams)), forced] = True
+    hidden &= own
 
-    kind = rng.random((count, size))
-    anyone = rng.integers(members, size=(count, size))
+    kind = rng.random(teams.shape)
+    anyone = rng.integers(members, size=teams.shape)
     shown = np.where(kind < SHOWN_AS_MASK + SHOWN_AS_ANYONE, anyone, teams)
     shown = np.where(kind < SHOWN_AS_MASK, OPEN, shown)
     return np.where(hidden, shown, teams), hidden
@@ -47,11 +51,12 @@ def guessing_loss(logits: Tensor, teams: Tensor, hidden: Tensor, weights: Tensor
 
     Args:
         logits: (K, T, N).
-        teams: (K, T) the true members.
-        hidden: (K, T) bool, at least one in each row.
+        teams: (K, T) the true members, ABSENT where a team has no place.
+        hidden: (K, T) bool, at least one in each row, none of them ABSENT.
         weights: (K,), mean 1.
     """
-    surprise = -torch.log_softmax(logits, dim=-1).gather(-1, teams[..., None])[..., 0]  # (K, T)
+    chosen = teams.clamp(min=0)[..., None]
+    surprise = -torch.log_softmax(logits, dim=-1).gather(-1, chosen)[..., 0]  # (K, T)
     per_team = (surprise * hidden).sum(dim=1) / hidden.sum(dim=1)
     return (weights * per_team).mean()
 

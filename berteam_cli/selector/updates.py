@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,28 +64,27 @@ def updated(
         learning_rate: Adam's; its other settings are torch's defaults.
     """
     weights = {name: value.clone().requires_grad_() for name, value in learnt.weights.items()}
-    adam = torch.optim.Adam(weights.values(), lr=learning_rate)
+    device = next(iter(weights.values())).device
+    adam = torch.optim.Adam(weights.values(), lr=learning_rate, fused=True)
     for name, weight in weights.items():
         adam.state[weight] = {
-            "step": torch.tensor(float(learnt.steps)),
+            "step": torch.tensor(float(learnt.steps), device=device),
             "exp_avg": learnt.means[name].clone(),
             "exp_avg_sq": learnt.squares[name].clone(),
         }
-    device = next(iter(weights.values())).device
-    losses = []
-    network.train()
 
     def asked(*inputs: np.ndarray | None) -> Tensor:
         on_device = (None if x is None else torch.from_numpy(x).to(device) for x in inputs)
         return functional_call(network, weights, tuple(on_device))
 
+    losses = []
+    network.train()
     with seeded(rng, device):
         for examples in minibatches:
-            loss = loss_of(asked, examples, rng)
             adam.zero_grad()
-            loss.backward()
+            whole = len(examples)
+            losses.append(sum(add_gradients(loss_of(asked, x, rng), len(x) / whole) for x in parts(network, examples)))
             adam.step()
-            losses.append(loss.item())
     after = Learnt(
         {name: weight.detach() for name, weight in weights.items()},
         {name: adam.state[weight]["exp_avg"] for name, weight in weights.items()},
@@ -93,3 +92,20 @@ def updated(
         learnt.steps + len(losses),
     )
     return after, float(np.mean(losses))
+
+
+def parts(network: TeamNetwork, examples: Examples) -> Iterator[Examples]:
+    """Yields a minibatch in parts that the memory holds: long teams go through the network a few at a time."""
+    size = network.rows(examples.teams.shape[1], *examples.rows.shape[1:3])
+    for first in range(0, len(examples), size):
+        yield examples[np.arange(first, min(first + size, len(examples)))]
+
+
+def add_gradients(loss: Tensor, share: float) -> float:
+    """Adds the gradient of ``loss``, a mean over ``share`` of a minibatch, and returns its part of the whole's loss.
+
+    Up to rounding all parts together give what the whole at once would; what dropout takes differs.
+    """
+    part = loss * share
+    part.backward()
+    return float(part.item())
