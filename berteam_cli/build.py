@@ -76,7 +76,7 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
         raise InputError(
             f"team_size must be at most {members}, the members of the population, but is {config.team_size}."
         )
-    field = Field(island_of(islands), config.team_size)
+    field = Field(island_of(islands), config.team_size, playing.env.sides)
     improving = optimizer(config, islands, playing)
     games_kept = config.games_per_epoch if improving.learns and not read_only else 0
     if not read_only:
@@ -125,14 +125,14 @@ def selector(config: TrainConfig, field: Field, device: str) -> Selector[Any]:
         raise InputError(str(error)) from error
 
 
-def fitness_rule(config: OptimizerConfig, selecting: str) -> FitnessRule:
-    """Returns how games become fitness.
+def fitness_rule(config: OptimizerConfig, selecting: str, sides: int) -> FitnessRule:
+    """Returns how games of ``sides`` teams become fitness.
 
     Raises:
         InputError: captains are to be rated, but the selector ``selecting`` names none.
     """
     if config.fitness == "moving_average":
-        return MovingAverage(config.average_rate)
+        return MovingAverage(config.average_rate, 1 / sides)
     if selecting == "mcaa" and not config.member_k > 0:
         raise InputError(
             "optimizer.fitness=elo rates captains, and selector=mcaa has none: "
@@ -149,7 +149,7 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
     """
     settings = asdict(config.optimizer)
     name = settings.pop("name")
-    rule = fitness_rule(config.optimizer, config.selector.name)
+    rule = fitness_rule(config.optimizer, config.selector.name, playing.env.sides)
     for used in ("fitness", "captain_k", "member_k", "average_rate"):
         settings.pop(used)
     if name == "fixed":

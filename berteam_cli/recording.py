@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from berteam_cli.learner.base import LEARNING_FIGURES
-from berteam_cli.outcomes import Outcomes
+from berteam_cli.outcomes import SIDES, Outcomes
 from berteam_cli.population import island_of, names
-from berteam_cli.records import COLUMNS, Tables, team_name, team_names
+from berteam_cli.records import COLUMNS, SIDES_TABLE, Tables, team_name, team_names
 from berteam_cli.selector.base import TeamDistribution, measured
 from berteam_cli.training import RECORDS, Clock, Parts, Report, Run, generator
 
@@ -44,6 +44,8 @@ class Recorder:
             entropy = self.state(run).entropy
             effective = math.exp(entropy)
         self.tables.add("games", game_rows(run.epoch, report.outcomes))
+        if self.parts.games.env.sides > 2:
+            self.tables.add(SIDES_TABLE, side_rows(run.epoch, report.outcomes))
         self.tables.add("learning", self.learning_rows(run, report))
         self.tables.add("generations", self.generation_rows(run, report))
         self.tables.add(
@@ -110,12 +112,19 @@ class Recorder:
 
 
 def game_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:
-    """Returns one row for each game."""
+    """Returns one row for each game, of its first two sides."""
     lineups = outcomes.lineups
-    captures, grabs, tags, walls = (outcomes.event(x) for x in ("captures", "grabs", "tags", "wall_hits"))
+    captures, grabs, tags, walls = (outcomes.event(x)[:, :2] for x in ("captures", "grabs", "tags", "wall_hits"))
     for b in range(len(lineups)):
         yield (
             *(epoch, b, team_name(lineups.teams[b, 0]), team_name(lineups.teams[b, 1])),
-            *(*lineups.captains[b], *outcomes.scores[b], outcomes.steps[b]),
+            *(*lineups.captains[b, :2], *outcomes.scores[b, :2], outcomes.steps[b]),
             *(*captures[b], *grabs[b], *tags[b], outcomes.seeds[b], *walls[b]),
         )
+
+
+def side_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:
+    """Returns one row for each side of each game."""
+    lineups, scores = outcomes.lineups, outcomes.scores
+    for b, s in np.ndindex(scores.shape):
+        yield epoch, b, SIDES[s], team_name(lineups.teams[b, s]), lineups.captains[b, s], scores[b, s]

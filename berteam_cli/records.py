@@ -33,6 +33,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("blue_captures", "red_captures", "blue_grabs", "red_grabs", "blue_tags", "red_tags", "seed"),
         *("blue_wall_hits", "red_wall_hits"),
     ),
+    "sides": ("epoch", "game", "side", "team", "captain", "score"),
     "generations": (
         *("epoch", "island", "removed", "parent", "removed_fitness", "parent_fitness", "removed_age", "reason"),
     ),
@@ -51,7 +52,13 @@ GROWING = (
     *("agents", "team_distribution", "captain_distribution", "island_distribution"),
     *("games", "generations", "learning", "selector", "timing"),
 )
-"""Tables that get rows in every epoch, or in every recorded one."""
+"""Tables that get rows in every epoch, or in every recorded one; beside them SIDES_TABLE, where it is written."""
+SIDES_TABLE = "sides"  # of games of more than two sides, whose row in "games" has no room for all
+
+
+def growing(sides: int) -> tuple[str, ...]:
+    """Returns the growing tables of a run whose games have so many ``sides``."""
+    return GROWING if sides == 2 else (*GROWING, SIDES_TABLE)
 
 
 def team_name(team: Iterable[int]) -> str:
@@ -74,18 +81,19 @@ def cell(value: Any) -> Any:
 class Tables:
     """The growing tables of one run folder, open for appending."""
 
-    def __init__(self, folder: Path, sizes: dict[str, int] | None = None) -> None:
+    def __init__(self, folder: Path, sizes: dict[str, int] | None = None, sides: int = 2) -> None:
         """Opens the tables.
 
         Args:
             folder: of the run.
             sizes: bytes of each table to keep, from a checkpoint; None starts them anew.
+            sides: of the run's games.
 
         Raises:
             RunError: a table has fewer bytes than that.
         """
         self.files = {}
-        for name in GROWING:
+        for name in growing(sides):
             path = folder / f"{name}.csv"
             if sizes is None:
                 path.write_text(",".join(COLUMNS[name]) + "\n", encoding="utf-8")

@@ -82,7 +82,7 @@ def trained(
     config: TrainConfig, folder: Path, parts: Parts, saved: Saved | None, started: float, stop: Stop
 ) -> tuple[Run, Recorder]:
     """Runs the epochs; returns the run after the last one, and what recorded it."""
-    tables = Tables(folder, saved.table_sizes if saved else None)
+    tables = Tables(folder, saved.table_sizes if saved else None, parts.games.env.sides)
     recorder = Recorder(tables, parts, config.record_every, config.record_teams)
     seconds = saved.seconds if saved else 0.0
     run = saved.run if saved else begin(parts)

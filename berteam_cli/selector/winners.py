@@ -74,12 +74,12 @@ def harvest(outcomes: Outcomes, draw_weight: float, weight_cap: float, members: 
 
     Args:
         outcomes: of one epoch.
-        draw_weight: factor for the teams of a draw; 0 leaves them out.
+        draw_weight: factor for the teams that share a draw; 0 leaves them out.
         weight_cap: largest weight before that factor.
         members: N to weight by inverse probability; None to give every team weight 1.
     """
     scores, lineups = outcomes.scores, outcomes.lineups
-    value = np.where(scores == 1.0, 1.0, np.where(scores == 0.5, draw_weight, 0.0))  # (B, S)
+    value = np.where(scores == 1.0, 1.0, np.where(scores > 0.0, draw_weight, 0.0))  # (B, S); a draw is what is shared
     kept = value > 0
     teams, weights = lineups.teams[kept], value[kept]
     if members is not None:
