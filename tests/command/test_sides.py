@@ -43,6 +43,8 @@ def test_every_selector_plays_among_three_sides_and_goes_on(selector, berteam, t
         pd.testing.assert_series_equal(of_side.score, games[f"{color}_score"], check_names=False)
         pd.testing.assert_series_equal(of_side.captain, games[f"{color}_captain"], check_names=False)
     assert (sides.captain == -1).all() if selector == "mcaa" else (by_game.captain.nunique() == 3).all()
+    agents = read(tmp_path / "whole", "agents").query("epoch == 0")
+    np.testing.assert_allclose(agents.fitness, 1 / 3 if selector == "mcaa" else 1000)  # a mean score, or Elo
     elo = read(tmp_path / "whole", "elo")
     assert len(elo) == 6
     assert (elo.wins + elo.draws + elo.losses == elo.games).all()
