@@ -129,7 +129,7 @@ def field_of(config: TrainConfig, islands: tuple[Island, ...], game: Env) -> Fie
             valid = allowed(places, [island.name for island in islands], owners, config.team_size)
     except ValueError as error:
         raise InputError(str(error)) from error
-    return Field(owners, config.team_size, valid=valid, exact_limit=config.selector.exact_limit)
+    return Field(owners, config.team_size, game.sides, valid, config.selector.exact_limit)
 
 
 def selector(config: TrainConfig, field: Field, game: Env, device: str) -> Selector[Any]:
@@ -151,14 +151,14 @@ def selector(config: TrainConfig, field: Field, game: Env, device: str) -> Selec
         raise InputError(str(error)) from error
 
 
-def fitness_rule(config: OptimizerConfig, selecting: str) -> FitnessRule:
-    """Returns how games become fitness.
+def fitness_rule(config: OptimizerConfig, selecting: str, sides: int) -> FitnessRule:
+    """Returns how games of ``sides`` teams become fitness.
 
     Raises:
         InputError: captains are to be rated, but the selector ``selecting`` names none.
     """
     if config.fitness == "moving_average":
-        return MovingAverage(config.average_rate)
+        return MovingAverage(config.average_rate, 1 / sides)
     if selecting == "mcaa" and not config.member_k > 0:
         raise InputError(
             "optimizer.fitness=elo rates captains, and selector=mcaa has none: "
@@ -175,7 +175,7 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
     """
     settings = asdict(config.optimizer)
     name = settings.pop("name")
-    rule = fitness_rule(config.optimizer, config.selector.name)
+    rule = fitness_rule(config.optimizer, config.selector.name, playing.env.sides)
     for used in ("fitness", "captain_k", "member_k", "average_rate"):
         settings.pop(used)
     if name == "fixed":

@@ -113,6 +113,8 @@ class MctfConfig(EnvConfig):
 class RpsConfig(EnvConfig):
     """Settings of env/rps.py."""
 
+    sides: int = number(2, 8)
+
 
 @dataclass
 class PettingzooConfig(EnvConfig):

@@ -52,7 +52,7 @@ class Games:
         Where players may leave a game early, the experience has a row for each player of each game, (B * V, 1).
         """
         games = len(lineups)
-        players = np.ascontiguousarray(lineups.teams.reshape(games, 2 * self.env.team_size))
+        players = np.ascontiguousarray(lineups.teams.reshape(games, self.env.sides * self.env.team_size))
         seeds = seeds_of(key, games)
         results = blank_results(self.env, games, record=record, room=room)
         each = min(GAMES_A_CALL, max(1, games // CALLS))
@@ -89,44 +89,62 @@ def seeds_of(key: int, games: int) -> np.ndarray:
     return np.array([seed_of(np.uint64(key), np.uint64(b)) for b in range(games)], dtype=np.uint64)
 
 
-def pairings(blue: Ints, red: Ints) -> Lineups:
-    """Returns the line-ups of games between (B, T) teams ``blue`` and ``red``, without captains."""
-    teams = np.stack([blue, red], axis=1)
+def pairings(blue: Ints, red: Ints, sides: int = 2) -> Lineups:
+    """Returns the line-ups of games of (B, T) teams ``blue``, side 0, against ``red`` on all others; no captains."""
+    return placed(blue, red, np.arange(sides)[np.newaxis] == 0)
+
+
+def placed(ours: Ints, theirs: Ints, held: Bools) -> Lineups:
+    """Returns the line-ups of games between two teams that hold all sides together, without captains.
+
+    Args:
+        ours: (B, T) teams.
+        theirs: (B, T) their opponents.
+        held: (B, S) or (1, S) the sides where ours stand; theirs stand on all others.
+    """
+    teams = np.where(held[:, :, np.newaxis], ours[:, np.newaxis], theirs[:, np.newaxis])
     nobody = np.full(teams.shape[:2], NOBODY, dtype=np.int64)
     return Lineups(teams, nobody, np.full(teams.shape[:2], np.nan))
 
 
-def in_turn(games: int, each: int) -> Bools:
-    """Returns (games,) which games a team plays as side 1: every second of its ``each`` games, not the first."""
-    return np.arange(games) % each % 2 == 1
+def in_turn(games: int, each: int, sides: int = 2) -> Ints:
+    """Returns (games,) the side from which a team plays its ``each`` games: side k % S in the k-th, from 0."""
+    return np.arange(games) % each % sides
 
 
-def both_sides(ours: Ints, theirs: Ints, each: int) -> Lineups:
-    """Returns games of (B, T) teams ``ours`` against ``theirs``, from either side in turn.
+def both_sides(ours: Ints, theirs: Ints, each: int, sides: int = 2) -> Lineups:
+    """Returns games of (B, T) teams ``ours`` against ``theirs``, from each side in turn.
 
     Args:
-        ours: ``each`` games of the same team in a row.
-        theirs: their opponents.
+        ours: ``each`` games of the same team in a row; it stands on one side.
+        theirs: their opponents, who stand on all others.
         each: games of each team of ours; all teams are on the same side in their k-th game.
+        sides: S.
     """
-    swapped = in_turn(len(ours), each)[:, np.newaxis]
-    return pairings(np.where(swapped, theirs, ours), np.where(swapped, ours, theirs))
+    return placed(ours, theirs, np.arange(sides) == in_turn(len(ours), each, sides)[:, np.newaxis])
 
 
 def as_side_0(outcomes: Outcomes, each: int) -> Outcomes:
-    """Returns the outcomes of ``both_sides`` games with us as side 0 in every record."""
-    swapped = in_turn(len(outcomes.steps), each)
-
-    def turned(per_side: np.ndarray) -> np.ndarray:
-        per_side = per_side.copy()
-        per_side[swapped] = per_side[swapped, ::-1]
-        return per_side
-
+    """Returns the outcomes of ``both_sides`` games with us as side 0 in every record, and those after us in turn."""
+    games, sides = outcomes.scores.shape
+    order = (np.arange(sides) + in_turn(games, each, sides)[:, np.newaxis]) % sides
+    row = np.arange(games)[:, np.newaxis]
     lineups = outcomes.lineups
     return Outcomes(
-        Lineups(turned(lineups.teams), turned(lineups.captains), turned(lineups.log_chances)),
-        turned(outcomes.scores),
+        Lineups(lineups.teams[row, order], lineups.captains[row, order], lineups.log_chances[row, order]),
+        outcomes.scores[row, order],
         outcomes.steps,
-        turned(outcomes.events),
+        outcomes.events[row, order],
         outcomes.seeds,
     )
+
+
+def arrangements(sides: int) -> Bools:
+    """Returns (A, S) the ways in which the first of two teams can hold sides, one team standing alone: A = 2 or 2 S.
+
+    In turn the first and the second team stand alone on side 0, then on side 1, and so on. Between two sides both are
+    alone, so that only two ways differ.
+    """
+    alone = np.eye(sides, dtype=np.bool_)
+    ways = np.stack([alone, ~alone], axis=1).reshape(2 * sides, sides)
+    return ways[:2] if sides == 2 else ways

@@ -3,7 +3,7 @@
 Shape letters, here and in every docstring of the package: B games, S sides, T places in a team,
 V = S * T players of a game (side 0 first), N members of the population, I islands, M members of one
 island, L steps of the longest game, O numbers of an observation, A actions, K teams or rows.
-Side 0 is blue, side 1 is red.
+Side 0 is blue, side 1 is red, and SIDES names all that there can be.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ Bools = npt.NDArray[np.bool_]
 OPEN = -1  # a place nobody holds yet
 ABSENT = -2  # no place at all, where teams of several sizes share an array
 NOBODY = -1  # no captain, no parent
+
+SIDES = ("blue", "red", "green", "gold", "purple", "orange", "cyan", "pink")  # what the tables call them
 
 EVENTS = ("captures", "grabs", "tags", "wall_hits")  # what a game counts for each side
 
@@ -50,7 +52,7 @@ class Outcomes:
 
     Attributes:
         lineups: who played.
-        scores: (B, S) 1 for a win, 0.5 for a draw, 0 for a loss.
+        scores: (B, S) summing to 1 in every game: the best sides share it. 1 is a win, 0 a loss, all between a draw.
         steps: (B,) length of each game.
         events: (B, S, len(EVENTS)) counts.
         seeds: (B,) uint64, the stream each game drew from.

@@ -43,7 +43,7 @@ class Population:
         minds: one learner's state for each island.
         fitness: (N,) on the scale of the fitness rule: nats of Elo, or a mean score in [0, 1].
         age: (N,) epochs since the place was last taken over.
-        games: (N,) games played since then, a game on both sides counted twice.
+        games: (N,) games played since then, a game on several sides counted for each.
         captain_games: (N,) of them as captain.
         parent: (N,) whose copy the member is, NOBODY for those of the beginning.
         behaviour: (N,) aggression as last measured, NaN before.

@@ -10,13 +10,19 @@ from typing import Any
 import numpy as np
 
 from berteam_cli.learner.base import LEARNING_FIGURES
-from berteam_cli.outcomes import Outcomes
+from berteam_cli.outcomes import SIDES, Outcomes
 from berteam_cli.population import island_of, names
-from berteam_cli.records import COLUMNS, Tables, team_name, team_names
+from berteam_cli.records import BY_SIDE_TABLE, COLUMNS, SIDES_TABLE, Tables, team_name, team_names
 from berteam_cli.selector.base import TeamDistribution, measured
 from berteam_cli.training import RECORDS, Clock, Parts, Report, Run, generator
 
 Row = tuple[Any, ...]
+
+
+def also_growing(parts: Parts) -> list[str]:
+    """Returns the tables that only runs of such ``parts`` have."""
+    several, apart = parts.games.env.sides > 2, parts.selector.by_side
+    return [name for name, there in ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart)) if there]
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,8 @@ class Recorder:
             entropy = self.state(run).entropy
             effective = math.exp(entropy)
         self.tables.add("games", game_rows(run.epoch, report.outcomes))
+        if self.parts.games.env.sides > 2:
+            self.tables.add(SIDES_TABLE, side_rows(run.epoch, report.outcomes))
         self.tables.add("learning", self.learning_rows(run, report))
         self.tables.add("generations", self.generation_rows(run, report))
         self.tables.add(
@@ -66,6 +74,8 @@ class Recorder:
         distribution = self.distribution(run)
         self.tables.add("agents", self.agent_rows(run))
         self.tables.add("team_distribution", distribution_rows(run.epoch, distribution))
+        if self.parts.selector.by_side:
+            self.tables.add(BY_SIDE_TABLE, self.by_side_rows(run))
         captains = self.parts.selector.captains(run.selection)
         self.tables.add("captain_distribution", ((run.epoch, n, chance) for n, chance in enumerate(captains)))
         islands = self.parts.optimizer.islands
@@ -74,6 +84,14 @@ class Recorder:
             "island_distribution", ((run.epoch, i.name, share) for i, share in zip(islands, shares, strict=True))
         )
         return distribution
+
+    def by_side_rows(self, run: Run) -> Iterator[Row]:
+        """Returns one row for each side and each team listed for it."""
+        rng = generator(self.parts.seed, RECORDS, run.epoch)
+        for side in range(self.parts.selector.field.sides):
+            distribution = measured(self.parts.selector, run.selection, rng, side=side)
+            for epoch, *row in distribution_rows(run.epoch, distribution):
+                yield (epoch, SIDES[side], *row)
 
     def agent_rows(self, run: Run) -> Iterator[Row]:
         """Returns one row for each member."""
@@ -115,12 +133,19 @@ def distribution_rows(epoch: int, distribution: TeamDistribution) -> Iterator[Ro
 
 
 def game_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:
-    """Returns one row for each game."""
+    """Returns one row for each game, of its first two sides."""
     lineups = outcomes.lineups
-    captures, grabs, tags, walls = (outcomes.event(x) for x in ("captures", "grabs", "tags", "wall_hits"))
+    captures, grabs, tags, walls = (outcomes.event(x)[:, :2] for x in ("captures", "grabs", "tags", "wall_hits"))
     for b in range(len(lineups)):
         yield (
             *(epoch, b, team_name(lineups.teams[b, 0]), team_name(lineups.teams[b, 1])),
-            *(*lineups.captains[b], *outcomes.scores[b], outcomes.steps[b]),
+            *(*lineups.captains[b, :2], *outcomes.scores[b, :2], outcomes.steps[b]),
             *(*captures[b], *grabs[b], *tags[b], outcomes.seeds[b], *walls[b]),
         )
+
+
+def side_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:
+    """Returns one row for each side of each game."""
+    lineups, scores = outcomes.lineups, outcomes.scores
+    for b, s in np.ndindex(scores.shape):
+        yield epoch, b, SIDES[s], team_name(lineups.teams[b, s]), lineups.captains[b, s], scores[b, s]

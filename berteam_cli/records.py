@@ -26,6 +26,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         "aggression",
     ),
     "team_distribution": ("epoch", "team", "probability", "error"),
+    "side_distribution": ("epoch", "side", "team", "probability", "error"),
     "captain_distribution": ("epoch", "agent", "probability"),
     "island_distribution": ("epoch", "island", "probability"),
     "games": (
@@ -33,6 +34,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("blue_captures", "red_captures", "blue_grabs", "red_grabs", "blue_tags", "red_tags", "seed"),
         *("blue_wall_hits", "red_wall_hits"),
     ),
+    "sides": ("epoch", "game", "side", "team", "captain", "score"),
     "generations": (
         *("epoch", "island", "removed", "parent", "removed_fitness", "parent_fitness", "removed_age", "reason"),
     ),
@@ -52,6 +54,8 @@ GROWING = (
     *("games", "generations", "learning", "selector", "timing"),
 )
 """Tables that get rows in every epoch, or in every recorded one."""
+SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row in "games" has no room for all
+BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
 
 
 def team_name(team: Iterable[int]) -> str:
@@ -74,18 +78,19 @@ def cell(value: Any) -> Any:
 class Tables:
     """The growing tables of one run folder, open for appending."""
 
-    def __init__(self, folder: Path, sizes: dict[str, int] | None = None) -> None:
+    def __init__(self, folder: Path, sizes: dict[str, int] | None = None, also: Sequence[str] = ()) -> None:
         """Opens the tables.
 
         Args:
             folder: of the run.
             sizes: bytes of each table to keep, from a checkpoint; None starts them anew.
+            also: tables that grow in this run, beside GROWING.
 
         Raises:
             RunError: a table has fewer bytes than that.
         """
         self.files = {}
-        for name in GROWING:
+        for name in (*GROWING, *also):
             path = folder / f"{name}.csv"
             if sizes is None:
                 path.write_text(",".join(COLUMNS[name]) + "\n", encoding="utf-8")

@@ -144,7 +144,7 @@ class Probes:
         env = self.parts.games.env
         members = policies(self.parts.optimizer.islands, population, explore=False)
         acting = joined([members, fixed_policies(range(len(env.fixed_policies)))])
-        lineups = both_sides(teams, opponents + population.size, each)
+        lineups = both_sides(teams, opponents + population.size, each, env.sides)
         outcomes, _ = self.parts.games.play(acting, lineups, self.key)
         self.steps += int(outcomes.steps.sum())
         return as_side_0(outcomes, each)

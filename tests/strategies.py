@@ -34,11 +34,11 @@ def outcomes(teams, scores, captains=None, events=None):
 
 
 @st.composite
-def played(draw, members=6, games=8, size=2):
-    """Outcomes of random games, each with two different captains."""
+def played(draw, members=6, games=8, size=2, sides=2):
+    """Outcomes of random games, each with different captains; the best sides share a score of 1."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    teams = rng.integers(members, size=(games, 2, size))
-    captains = np.array([rng.choice(members, 2, replace=False) for _ in range(games)])
+    teams = rng.integers(members, size=(games, sides, size))
+    captains = np.array([rng.choice(members, sides, replace=False) for _ in range(games)])
     teams[:, :, 0] = captains
-    first = rng.choice([0.0, 0.5, 1.0], size=games)
-    return outcomes(teams, np.stack([first, 1 - first], axis=1), captains)
+    best = rng.integers(1, 2**sides, size=games)[:, np.newaxis] >> np.arange(sides) & 1
+    return outcomes(teams, best / best.sum(axis=1, keepdims=True), captains)

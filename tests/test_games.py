@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 
 from berteam_cli.acting import fixed_policies, joined
-from berteam_cli.games import as_side_0, both_sides, in_turn, pairings, seeds_of
+from berteam_cli.env.rps import Rps
+from berteam_cli.games import Games, arrangements, as_side_0, both_sides, in_turn, pairings, seeds_of
+from berteam_cli.workers import Workers
 from tests.makers import SHORT, mctf, random_networks
 
 
@@ -96,7 +98,8 @@ def test_scores_are_captures_and_sides_are_told_apart():
 
 
 def test_sides_are_taken_in_turn_anew_for_every_team():
-    np.testing.assert_array_equal(in_turn(6, 3), [False, True, False] * 2)
+    np.testing.assert_array_equal(in_turn(6, 3), [0, 1, 0] * 2)
+    np.testing.assert_array_equal(in_turn(8, 4, 3), [0, 1, 2, 0] * 2)
 
 
 def test_both_sides_and_back():
@@ -112,3 +115,37 @@ def test_both_sides_and_back():
         turned.scores[:, 0], [outcomes.scores[0, 0], outcomes.scores[1, 1], outcomes.scores[2, 0]]
     )
     np.testing.assert_array_equal(turned.events[1], outcomes.events[1, ::-1])
+
+
+def test_every_side_of_three_and_back():
+    games = Games(Rps(1, 3), Workers(1))
+    ours, theirs = np.zeros((3, 1), dtype=int), np.ones((3, 1), dtype=int)
+    lineups = both_sides(ours, theirs, 3, 3)
+    np.testing.assert_array_equal(lineups.teams[:, :, 0], [[0, 1, 1], [1, 0, 1], [1, 1, 0]])
+    outcomes, _ = games.play(fixed_policies([1, 0]), lineups, 0)  # paper against two rocks
+    np.testing.assert_array_equal(outcomes.scores, np.eye(3))
+    turned = as_side_0(outcomes, 3)
+    np.testing.assert_array_equal(turned.scores, [[1, 0, 0]] * 3)
+    np.testing.assert_array_equal(turned.lineups.teams[:, :, 0], [[0, 1, 1]] * 3)
+
+
+def test_the_sides_after_ours_keep_their_order():
+    outcomes, _ = Games(Rps(1, 3), Workers(1)).play(
+        fixed_policies(range(3)), both_sides(np.array([[0]] * 3), np.array([[1]] * 3), 3, 3), 0
+    )
+    outcomes.events[:, :, 0] = [[10, 11, 12]] * 3
+    np.testing.assert_array_equal(as_side_0(outcomes, 3).events[:, :, 0], [[10, 11, 12], [11, 12, 10], [12, 10, 11]])
+
+
+@pytest.mark.parametrize("sides", [2, 3, 5])
+def test_ways_to_hold_the_sides_differ_and_one_team_is_alone(sides):
+    ways = arrangements(sides)
+    assert len({tuple(way) for way in ways}) == len(ways) == (2 if sides == 2 else 2 * sides)
+    assert set(ways.sum(axis=1)) == {1, sides - 1}
+    np.testing.assert_array_equal(ways.sum(axis=0), len(ways) / 2)
+    np.testing.assert_array_equal(ways[:2, 0], [True, False])
+
+
+def test_pairings_of_three_sides():
+    teams = pairings(np.array([[0, 1]]), np.array([[2, 3]]), 3).teams
+    np.testing.assert_array_equal(teams, [[[0, 1], [2, 3], [2, 3]]])

@@ -25,6 +25,13 @@ def test_what_is_told_is_what_is_taken(learner):
     assert trajectory_bytes(parts.games.env, 16) == sum(x.nbytes for x in parts.room)
 
 
+def test_more_sides_take_more_room():
+    words = ["env=rps", "env.sides=3", "population=ppo6"]
+    parts = build.parts(checked(composed(*words, "learner.n_steps=8", "learner.minibatch_size=4")))
+    assert parts.room.actions.shape == (16, 6, 1)
+    assert trajectory_bytes(parts.games.env, 16) == sum(x.nbytes for x in parts.room)
+
+
 def test_the_trajectories_of_an_epoch_go_where_those_of_the_last_one_went():
     games = mctf(max_time_s=20.0)
     room = blank_trajectories(games.env, 2)

@@ -111,6 +111,15 @@ def test_probes_play_members_as_they_are_evaluated_against_fixed_policies():
     np.testing.assert_array_equal(outcomes.scores.sum(axis=1), 1)
 
 
+def test_probes_among_three_sides_are_told_from_the_members_view():
+    made = parts("selector=uniform", "env.sides=3")
+    probes = Probes(made, 5)
+    outcomes = probes.play(begin(made).population, np.zeros((3, 2), int), np.array([[0, 0]] * 3), 3)
+    np.testing.assert_array_equal(outcomes.lineups.teams[:, 0], 0)
+    np.testing.assert_array_equal(outcomes.lineups.teams[:, 1:], 6)
+    np.testing.assert_array_equal(outcomes.scores[:, 1], outcomes.scores[:, 2])  # two copies of rock fare alike
+
+
 def test_the_clock_counts_every_part():
     made = parts("selector=uniform")
     _, report = epoch(begin(made), made)

@@ -21,10 +21,10 @@ from berteam_cli.evaluation.reference import table_name
 from berteam_cli.evaluation.tournament import Standings, tournament
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder, read_manifest
 from berteam_cli.games import Games
-from berteam_cli.outcomes import Ints
+from berteam_cli.outcomes import SIDES, Ints
 from berteam_cli.population import names, policies
-from berteam_cli.recording import game_rows
-from berteam_cli.records import COLUMNS, team_name, team_names, write_table
+from berteam_cli.recording import game_rows, side_rows
+from berteam_cli.records import COLUMNS, SIDES_TABLE, team_name, team_names, write_table
 from berteam_cli.selector.base import team_count, unordered_teams
 from berteam_cli.stored import plain_config, stored_config, write_config
 from berteam_cli.training import RECORDS, generator
@@ -62,6 +62,8 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> flo
             write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, entry.names))
             write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
             write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
+            if entry.games.env.sides > 2:
+                write_table(folder / f"{SIDES_TABLE}.csv", COLUMNS[SIDES_TABLE], side_rows(0, standings.outcomes))
     show(folder, 10)
     return math.nan
 
@@ -172,7 +174,7 @@ def of_run(config: TournamentConfig) -> Entry:
 
 def elo_rows(standings: Standings, called: list[str]) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of elo.csv, the strongest team first; nobody predicted anything here."""
-    won, drawn, lost = standings.results.sum(axis=0).sum(axis=2)
+    won, drawn, lost = standings.record.sum(axis=2)
     for rank, k in enumerate(np.argsort(-standings.elos, kind="stable"), start=1):
         elo, width, team = standings.elos[k], standings.half_widths[k], standings.teams[k]
         yield (
@@ -182,11 +184,11 @@ def elo_rows(standings: Standings, called: list[str]) -> Iterator[tuple[Any, ...
 
 
 def pair_rows(standings: Standings) -> Iterator[tuple[Any, ...]]:
-    """Returns the rows of pairs.csv: each team against each other, apart for the side it played."""
+    """Returns the rows of pairs.csv: each team against each other, apart for the side it played alone."""
     names = team_names(standings.teams)
     for k, team in enumerate(names):
         for j, opponent in enumerate(names):
-            for side, color in enumerate(("blue", "red")):
-                counts = standings.results[side, :, k, j]
+            for color, results in zip(SIDES, standings.results, strict=False):
+                counts = results[:, k, j]
                 if counts.sum():
                     yield team, opponent, counts.sum(), *counts, color

@@ -15,7 +15,7 @@ from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder
 from berteam_cli.memory import spoken, state_bytes
 from berteam_cli.pace import Pace
-from berteam_cli.recording import Recorder
+from berteam_cli.recording import Recorder, also_growing
 from berteam_cli.records import Tables
 from berteam_cli.stopping import Stop, stoppable
 from berteam_cli.stored import check_same, goes_on, write_config
@@ -84,7 +84,7 @@ def trained(
     config: TrainConfig, folder: Path, parts: Parts, saved: Saved | None, started: float, stop: Stop
 ) -> tuple[Run, Recorder]:
     """Runs the epochs; returns the run after the last one, and what recorded it."""
-    tables = Tables(folder, saved.table_sizes if saved else None)
+    tables = Tables(folder, saved.table_sizes if saved else None, also_growing(parts))
     recorder = Recorder(tables, parts, config.record_every)
     seconds = saved.seconds if saved else 0.0
     run = saved.run if saved else begin(parts)

@@ -40,11 +40,12 @@ class Results(NamedTuple):
 
 
 class Env(Protocol):
-    """A kind of game between S = 2 teams of T places; keeps settings only.
+    """A kind of game between S teams of T places; keeps settings only.
 
     Attributes:
         name: of the config choice.
         team_size: T.
+        sides: S, at least 2.
         observation_size: O.
         actions: A, how many discrete actions there are.
         longest: L, steps after which every game is over.
@@ -54,6 +55,7 @@ class Env(Protocol):
 
     name: str
     team_size: int
+    sides: int
     observation_size: int
     actions: int
     longest: int
@@ -102,7 +104,7 @@ class Trajectories(NamedTuple):
 
 def blank_trajectories(env: Env, games: int) -> Trajectories:
     """Returns room for the trajectories of ``games`` games; the memory is taken when they are written."""
-    players = 2 * env.team_size
+    players = env.sides * env.team_size
     return Trajectories(
         observations=np.empty((games, players, env.longest + 1, env.observation_size), dtype=np.float32),
         actions=np.empty((games, players, env.longest), dtype=np.int16),
@@ -115,16 +117,16 @@ def blank_trajectories(env: Env, games: int) -> Trajectories:
 def trajectory_bytes(env: Env, games: int) -> int:
     """Returns how much memory ``blank_trajectories`` takes when all games are as long as they can be."""
     a_step = 4 * env.observation_size + 2 + 4
-    return games * 2 * env.team_size * (env.longest * a_step + 4 * env.observation_size + 8 + 1)
+    return games * env.sides * env.team_size * (env.longest * a_step + 4 * env.observation_size + 8 + 1)
 
 
 def blank_results(env: Env, games: int, *, record: bool, room: Trajectories | None = None) -> Results:
     """Returns room for the results of ``games`` games; if ``record`` trajectories go to ``room``, or to a new one."""
     trajectories = room if record and room is not None else blank_trajectories(env, games if record else 0)
     return Results(
-        np.zeros((games, 2)),
+        np.zeros((games, env.sides)),
         np.zeros(games, dtype=np.int64),
-        np.zeros((games, 2, len(EVENTS)), dtype=np.int64),
+        np.zeros((games, env.sides, len(EVENTS)), dtype=np.int64),
         np.zeros(games, dtype=np.bool_),
         *trajectories,
     )

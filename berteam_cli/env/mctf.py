@@ -45,6 +45,7 @@ class Mctf:
     observation_size: int
     longest: int
     name: str = "mctf"
+    sides: int = 2
     actions: int = ACTIONS
     fixed_policies: tuple[str, ...] = field(default=FIXED_POLICIES)
     standard_policies: int = len(PAPER)

@@ -42,6 +42,7 @@ class Pettingzoo:
     longest: int
     processes: Processes
     name: str = "pettingzoo"
+    sides: int = 2
     fixed_policies: tuple[str, ...] = ("random",)
     standard_policies: int = 1
 

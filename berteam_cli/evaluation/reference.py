@@ -20,7 +20,7 @@ from berteam_cli.selector.base import unordered_teams
 
 log = logging.getLogger("berteam")
 
-GAMES_PER_PAIR = 8  # every order of the members of teams of two, from both sides
+GAMES_PER_PAIR = 8  # every order of the members of teams of two, from both of two sides
 SEED = 0  # one for all runs, so that they share the yardstick
 
 

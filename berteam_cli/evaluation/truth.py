@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from berteam_cli.acting import Policies, fixed_policies, joined
 from berteam_cli.evaluation.reference import Reference
-from berteam_cli.games import Games, as_side_0, both_sides
+from berteam_cli.games import Games, arrangements, placed
 from berteam_cli.outcomes import Bools, Floats, Ints
 from berteam_cli.rating.bradley_terry import Z_95, held_ratings
 from berteam_cli.rating.elo import points
@@ -172,7 +172,8 @@ def truth(
 ) -> Truth:
     """Returns the Elos of the ``chosen`` teams.
 
-    Every team plays every team of ``reference``, from either side in turn, the members of both in random order.
+    Every team plays every team of ``reference``, in turn as ``games.arrangements`` says: of two sides from either, of
+    more alone or with the other team alone. The members of both stand in random order.
 
     Args:
         games: the game and its threads.
@@ -188,9 +189,24 @@ def truth(
     ours = np.repeat(teams, anchors * games_per_pair, axis=0)
     theirs = np.tile(np.repeat(reference.teams + len(members.kind), games_per_pair, axis=0), (len(teams), 1))
     each = anchors * games_per_pair
-    lineups = both_sides(rng.permuted(ours, axis=1), rng.permuted(theirs, axis=1), each)
+    ways = arrangements(games.env.sides)
+    held = ways[np.arange(len(ours)) % each % len(ways)]
+    lineups = placed(rng.permuted(ours, axis=1), rng.permuted(theirs, axis=1), held)
     outcomes, _ = games.play(acting, lineups, int(rng.integers(2**63)))
-    scores = as_side_0(outcomes, each).scores[:, 0].reshape(len(teams), anchors, games_per_pair)
-    elos, half_widths = held_ratings(scores.sum(axis=2), np.full(scores.shape[:2], games_per_pair), reference.elos)
-    counts = [(scores == result).sum(axis=(1, 2)) for result in (1.0, 0.5, 0.0)]
-    return Truth(chosen, elos, half_widths, *counts)
+    shape = (len(teams), anchors, games_per_pair)
+    made = np.where(held, outcomes.scores, 0.0).sum(axis=1).reshape(shape)
+    left = np.where(held, 0.0, outcomes.scores).sum(axis=1).reshape(shape)
+    stood = held.sum(axis=1).reshape(shape)  # on so many sides
+    points, played, handicaps = [], [], []
+    for k in np.unique(stood):
+        points.append(np.where(stood == k, made, 0.0).sum(axis=2))
+        played.append((stood == k).sum(axis=2))
+        handicaps.append(np.full(anchors, math.log((games.env.sides - k) / k)))
+    elos, half_widths = held_ratings(
+        np.concatenate(points, axis=1),
+        np.concatenate(played, axis=1),
+        np.tile(reference.elos, len(handicaps)),
+        np.concatenate(handicaps),
+    )
+    won, lost = (left == 0.0).sum(axis=(1, 2)), (made == 0.0).sum(axis=(1, 2))
+    return Truth(chosen, elos, half_widths, won, each - won - lost, lost)

@@ -39,7 +39,7 @@ Probe = Callable[[Population, Ints, Ints, int], Outcomes]
 """Plays probing games nobody learns from.
 
 Called with the population, the teams of the members (B, T), the opposing fixed policies (B, T), and how many games in a
-row are the same team's; returns outcomes with the members as side 0 in every record, played from either side in turn.
+row are the same team's; returns outcomes with the members as side 0 in every record, played from each side in turn.
 """
 
 

@@ -42,8 +42,8 @@ class CaptainElo:
 
     Attributes:
         captain_k: c of a captain, in Elo points (chess writes 32).
-        member_k: c of every member of a team, captain included, against the mean fitness of the other team's
-            members; 0 in the paper's experiments with learners.
+        member_k: c of every member of a team, captain included, where the mean fitness of a team's members takes the
+            captain's place; 0 in the paper's experiments with learners.
     """
 
     captain_k: float
@@ -56,9 +56,9 @@ class CaptainElo:
         for teams, captains, scores in zip(
             outcomes.lineups.teams, outcomes.lineups.captains, outcomes.scores, strict=True
         ):
-            if captain_step and NOBODY not in captains and len(set(captains)) == len(captains):
-                # The same captain on both sides would win what it loses.
-                fitness[captains] += captain_step * (scores - softmax(fitness[captains]))
+            if captain_step and NOBODY not in captains and len(set(captains)) > 1:
+                # The same captain on all sides would win what it loses; on some of them it is paid for each.
+                np.add.at(fitness, captains, captain_step * (scores - softmax(fitness[captains])))
             if member_step:
                 gain = member_step * (scores - softmax(fitness[teams].mean(axis=1)))
                 np.add.at(fitness, teams, gain[:, np.newaxis])

@@ -2,6 +2,9 @@
 
 For strengths s in nats, player i scores against j with expectation 1 / (1 + exp(s_j - s_i)). Where the likelihood is
 highest, every player's expected points equal the points it made.
+
+In a game of S sides scores are expected to be the softmax of the sides' strengths (paper, Elo equation). So a player
+that stands alone against S - 1 copies of another has the handicap ln(S - 1): 1 / (1 + exp(s_j + ln(S - 1) - s_i)).
 """
 
 from __future__ import annotations
@@ -23,38 +26,51 @@ def expected(strengths: Floats, others: Floats) -> Floats:
     return 0.5 * (1.0 + np.tanh(0.5 * (strengths - others)))
 
 
-def ratings(scores: Floats, games: Floats) -> tuple[Floats, Floats]:
+def ratings(scores: Floats, games: Floats, handicap: float = 0.0) -> tuple[Floats, Floats]:
     """Returns the Elo of every player of a tournament, with mean 1000, and its 95 % half width.
 
     The width comes from the Fisher information of decided games. Draws scatter less than that, so where many games are
     drawn it is too wide rather than too narrow.
 
     Args:
-        scores: (K, K) points row made against column.
-        games: (K, K) games between them, symmetric; the diagonal is ignored.
+        scores: (K, K) points row made against column; with a handicap, in the games where row stood alone.
+        games: (K, K) those games; the diagonal is ignored. Without a handicap row and column are alike, so that each
+            game is in both triangles: games are symmetric, and scores add up to them.
+        handicap: in nats, of the player that stands alone: ln(S - 1) against the copies on S - 1 sides, 0 for S = 2.
     """
     games = np.where(np.eye(len(games), dtype=bool), 0.0, games)
-    made = np.where(games > 0, scores, 0.0).sum(axis=1) + 0.5 * PRIOR_DRAWS
+    scores = np.where(games > 0, scores, 0.0)
+    # What row made together with its copies, in the games where column stood alone.
+    crowds = games.T if handicap > 0 else np.zeros_like(games)
+    shared = (games - scores).T if handicap > 0 else np.zeros_like(games)
+    made = scores.sum(axis=1) + shared.sum(axis=1) + 0.5 * PRIOR_DRAWS
 
     def loss_and_slope(strengths: Floats) -> tuple[float, Floats]:
         gaps = strengths[:, np.newaxis] - strengths
-        chances = expected(strengths[:, np.newaxis], strengths)
-        # -ln likelihood: each pair appears in both triangles, with scores that add up to its games.
-        loss = (np.where(games > 0, scores, 0.0) * np.logaddexp(0.0, -gaps)).sum()
+        # -ln likelihood: each game appears twice, as row's and as column's, with scores that add up to it.
+        loss = (scores * np.logaddexp(0.0, handicap - gaps)).sum()
+        loss += (shared * np.logaddexp(0.0, -handicap - gaps)).sum()
         loss += PRIOR_DRAWS * (np.logaddexp(0.0, -strengths) + 0.5 * strengths).sum()
-        slope = (games * chances).sum(axis=1) + PRIOR_DRAWS * expected(strengths, 0.0) - made
-        return float(loss), slope
+        alone, together = chances(strengths)
+        hoped = (games * alone).sum(axis=1) + (crowds * together).sum(axis=1)
+        return float(loss), hoped + PRIOR_DRAWS * expected(strengths, 0.0) - made
+
+    def chances(strengths: Floats) -> tuple[Floats, Floats]:
+        own = strengths[:, np.newaxis]
+        return expected(own, strengths + handicap), expected(own, strengths - handicap)
 
     from scipy.optimize import minimize  # noqa: PLC0415 (half a second, and only tournaments need it)
 
     fit = minimize(loss_and_slope, np.zeros(len(games)), jac=True, method="BFGS", options={"gtol": 1e-9})
     strengths = fit.x - fit.x.mean()
-    chances = expected(strengths[:, np.newaxis], strengths)
-    information = (games * chances * (1 - chances)).sum(axis=1) + PRIOR_DRAWS / 4
-    return points(strengths), Z_95 * POINTS_PER_NAT / np.sqrt(information)
+    alone, together = chances(strengths)
+    information = (games * alone * (1 - alone)).sum(axis=1) + (crowds * together * (1 - together)).sum(axis=1)
+    return points(strengths), Z_95 * POINTS_PER_NAT / np.sqrt(information + PRIOR_DRAWS / 4)
 
 
-def held_ratings(scores: Floats, games: Floats, anchors: Floats) -> tuple[Floats, Floats]:
+def held_ratings(
+    scores: Floats, games: Floats, anchors: Floats, handicap: Floats | float = 0.0
+) -> tuple[Floats, Floats]:
     """Returns the Elo of players who met only opponents of known Elo, and its 95 % half width.
 
     Each player has its own equation, sum of (score - expected score) = 0, which falls in the strength: it is solved by
@@ -64,8 +80,9 @@ def held_ratings(scores: Floats, games: Floats, anchors: Floats) -> tuple[Floats
         scores: (K, J) points of player k against anchor j.
         games: (K, J) games between them.
         anchors: (J,) Elo of the anchors, held.
+        handicap: (J,) or one number, nats by which players are behind: ln(c / k) on k sides against c of the anchor.
     """
-    held = nats(np.asarray(anchors, dtype=float))
+    held = nats(np.asarray(anchors, dtype=float)) + handicap
     made = scores.sum(axis=1) + 0.5 * PRIOR_DRAWS
     low = np.full(len(scores), held.min(initial=0.0) - 40.0)
     high = np.full(len(scores), held.max(initial=0.0) + 40.0)

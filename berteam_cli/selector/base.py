@@ -224,16 +224,16 @@ def exactly(field: Field) -> bool:
     return team_count(field.members, field.team_size) <= field.exact_limit and asked <= 20 * field.exact_limit
 
 
-def measured(selector: Selector[Any], state: Any, rng: Generator) -> TeamDistribution:
+def measured(selector: Selector[Any], state: Any, rng: Generator, **side: int) -> TeamDistribution:
     """Returns the distribution over teams: exact where ``exactly`` says so, else that of drawn ones.
 
-    A sampled distribution lists the ``exact_limit`` most frequent teams with the standard errors of their shares; the
+    With ``side`` that for one side, of a selector that tells them apart. A sampled distribution lists the ``exact_limit`` most frequent teams with the standard errors of their shares; the
     rest is its ``other``.
     """
     if exactly(selector.field):
-        return selector.distribution(state)
+        return selector.distribution(state, **side)
     samples = sample_size(selector.field.team_size)
-    drawn = np.sort(selector.sample(state, samples, rng), axis=1)
+    drawn = np.sort(selector.sample(state, samples, rng, **side), axis=1)
     teams, counts = np.unique(drawn, axis=0, return_counts=True)
     listed = np.sort(np.argsort(-counts, kind="stable")[: selector.field.exact_limit])
     share = counts[listed] / samples

@@ -11,11 +11,11 @@ HANDS = ("rock", "paper", "scissors")
 
 @njit(cache=True, nogil=True)
 def hands_beaten(ours: np.ndarray, theirs: np.ndarray) -> int:
-    """Returns how many hands of a team are beaten by any hand of the other.
+    """Returns how many hands of a team are beaten by any hand of the others.
 
     Args:
         ours: (T,) index into HANDS of each member's hand.
-        theirs: (T,) the same of the other team.
+        theirs: (any,) the same of all members of the other teams.
     """
     beaten = 0
     for a in ours:

@@ -49,31 +49,31 @@ def run(berteam):
 
 def test_members_act_the_same_when_loaded(run, berteam, tmp_path):
     ours = members_of(tmp_path / "run")
-    work, seen = np.zeros(2 * ours.sizes.max(), dtype=np.float32), np.ones(1, dtype=np.float32)
+    work, seen = np.zeros(2 * ours.sizes.max(), dtype=np.float32), np.array([1, 0, 0, 0], dtype=np.float32)
     for agent in (1, 4):
         said = berteam("export", "run", f"agent={agent}").stdout.splitlines()
         assert said[-1] == f"run/agent_{agent}.zip"
         assert said[0] == f"ppo{(64, 96)[agent // 3]}.{agent % 3} of run after epoch 4."
         model = PPO.load(said[-1])
-        assert (model.observation_space.shape, model.action_space.n) == ((1,), 3)
+        assert (model.observation_space.shape, model.action_space.n) == ((4,), 3)
         grid = (np.arange(4000) + 0.5) / 4000
         shares = np.bincount([act(ours, agent, seen, work, 0.0, x) for x in grid], minlength=3) / 4000
         with torch.no_grad():
-            chances = model.policy.get_distribution(torch.ones(1, 1)).distribution.probs[0]
+            chances = model.policy.get_distribution(torch.from_numpy(seen[np.newaxis])).distribution.probs[0]
         np.testing.assert_allclose(shares, chances, atol=5e-4)
         assert model.num_timesteps > 0
         assert model.policy.optimizer.state_dict()["state"]
     for agent in (6, 11):
         berteam("export", "run", f"agent={agent}", f"out=there/{agent}")
         model = DQN.load(tmp_path / "there" / f"{agent}.zip")
-        action, _ = model.predict(np.ones(1, dtype=np.float32), deterministic=True)
+        action, _ = model.predict(seen, deterministic=True)
         assert action == act(ours, agent, seen, work, 0.5, 0.5)
 
 
 def test_the_line_it_prints_loads_the_member(run, berteam, tmp_path):
     for agent in (0, 6):
         line = berteam("export", "run", f"agent={agent}").stdout.splitlines()[1]
-        found = {"observation": np.ones(1, dtype=np.float32)}
+        found = {"observation": np.ones(4, dtype=np.float32)}
         exec(line, found)
         assert type(found["model"]) is (PPO if agent == 0 else DQN)
 
@@ -188,10 +188,10 @@ def test_what_has_no_network_is_not_exported(berteam, tmp_path):
 
 
 def model(path, actions=3, **settings):
-    """Saves a new model for a game of one number to see."""
+    """Saves a new model for a game of four numbers to see."""
 
     class Game(gymnasium.Env):
-        observation_space = gymnasium.spaces.Box(-1, 1, (1,), dtype=np.float32)
+        observation_space = gymnasium.spaces.Box(-1, 1, (4,), dtype=np.float32)
         action_space = gymnasium.spaces.Discrete(actions)
 
     PPO("MlpPolicy", Game(), device="cpu", **settings).save(path)
@@ -202,7 +202,7 @@ IMPORTS = {
     files("a.zip", "text.zip"): r"population.members\[1\].file=text.zip is no whole zip file",
     files(
         "a.zip", "wide.zip"
-    ): r"members\[1\].file=wide.zip sees 1 numbers and has 5 actions, but .* 1 and there are 3",
+    ): r"members\[1\].file=wide.zip sees 4 numbers and has 5 actions, but .* 4 and there are 3",
     files("a.zip", "b/a.zip"): r"members\[1\].name is 'a', as that of member 0",
     files("two words.zip"): r"members\[0\].name must be a word that tables can hold, but is 'two words'",
     "population.members=[{file: a.zip, name: nan}]": r"members\[0\].name must be a word",

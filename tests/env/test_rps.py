@@ -5,6 +5,7 @@ from scipy.optimize import linprog
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
 from berteam_cli.games import Games, pairings
+from berteam_cli.outcomes import NOBODY, Lineups
 from berteam_cli.selector.base import Field, unordered_teams
 from berteam_cli.selector.mcaa import Mcaa, McaaState
 from berteam_cli.workers import Workers
@@ -51,12 +52,66 @@ def test_games_and_what_they_pay():
     assert seen.terminated.all()
 
 
-def test_networks_play_too():
-    games = Games(Rps(3), Workers(2))
+def of_sides(*games):
+    """Line-ups from words such as "rr ps ss": a team for each side, a hand for each member."""
+    teams = np.array([[["rps".index(x) for x in team] for team in game.split()] for game in games])
+    nothing = np.zeros(teams.shape[:2])
+    return Lineups(teams, nothing.astype(int) + NOBODY, nothing)
+
+
+@pytest.mark.parametrize(
+    ("game", "scores", "paid"),
+    [
+        ("r p s", [1 / 3, 1 / 3, 1 / 3], [0, 0, 0]),  # each hand is beaten by one
+        ("r r r", [1 / 3, 1 / 3, 1 / 3], [0, 0, 0]),
+        ("r r p", [0, 0, 1], [-0.5, -0.5, 1]),
+        ("p r p", [0.5, 0, 0.5], [0.5, -1, 0.5]),
+        ("rp ss rr", [1, 0, 0], [0.5, -0.25, -0.25]),  # one of rp is cut; its paper wraps both of rr, not its own rock
+        ("rp pr ps", [0, 0, 1], [-0.25, -0.25, 0.5]),  # its own scissors do not cut the paper of ps
+        ("r r s s", [0.5, 0.5, 0, 0], [2 / 3, 2 / 3, -2 / 3, -2 / 3]),
+    ],
+)
+def test_more_sides_by_hand(game, scores, paid):
+    lineups = of_sides(game)
+    sides, size = lineups.teams.shape[1:]
+    outcomes, seen = Games(Rps(size, sides), Workers(1)).play(FIXED, lineups, 0, record=True)
+    np.testing.assert_array_equal(outcomes.scores, [scores])
+    np.testing.assert_allclose(seen.rewards[0, :, 0], np.repeat(paid, size), atol=1e-6)
+
+
+def test_two_sides_score_as_the_rule_says():
+    teams = unordered_teams(3, 3)
+    k, j = map(np.ravel, np.indices((len(teams), len(teams))))
+    outcomes, seen = Games(Rps(3), Workers(1)).play(FIXED, pairings(teams[k], teams[j]), 0, record=True)
+    gaps = np.array([hands_beaten(b, a) - hands_beaten(a, b) for a, b in zip(teams[k], teams[j], strict=True)])
+    np.testing.assert_array_equal(outcomes.scores[:, 0], (np.sign(gaps) + 1) / 2)
+    np.testing.assert_array_equal(outcomes.scores[:, 1], (np.sign(-gaps) + 1) / 2)
+    np.testing.assert_array_equal(seen.rewards[:, 0, 0], (gaps / 3).astype(np.float32))
+
+
+def test_players_see_the_others_hands_when_they_are_shown():
+    _, seen = Games(Rps(2, 3), Workers(1)).play(FIXED, of_sides("rp ss rs"), 0, record=True)
+    assert seen.observations.shape == (1, 6, 2, 7)
+    np.testing.assert_array_equal(seen.observations[0, :, 0], [[1, 0, 0, 0, 0, 0, 0]] * 6)
+    assert seen.lengths.tolist() == [1]
+    rp, ss, rs = [0.5, 0.5, 0], [0, 0, 1], [0.5, 0, 0.5]
+    after = [[1, *ss, *rs], [1, *rs, *rp], [1, *rp, *ss]]  # the next side first
+    np.testing.assert_array_equal(seen.observations[0, :, 1], np.repeat(after, 2, axis=0))
+
+
+@pytest.mark.parametrize("sides", [2, 3, 8])
+def test_networks_play_too(sides):
+    games = Games(Rps(3, sides), Workers(2))
     rng = np.random.default_rng(0)
-    lineups = pairings(rng.integers(5, size=(50, 3)), rng.integers(5, size=(50, 3)))
-    outcomes, _ = games.play(random_networks(5, games.env), lineups, 1)
-    np.testing.assert_array_equal(outcomes.scores.sum(axis=1), 1)
+    teams = rng.integers(5, size=(50, sides, 3))
+    nothing = np.zeros((50, sides))
+    lineups = Lineups(teams, nothing.astype(int) + NOBODY, nothing)
+    outcomes, seen = games.play(random_networks(5, games.env), lineups, 1, record=True)
+    np.testing.assert_allclose(outcomes.scores.sum(axis=1), 1)
+    np.testing.assert_allclose(seen.rewards.sum(axis=1), 0, atol=1e-5)
+    best = outcomes.scores.max(axis=1)
+    assert (outcomes.scores == np.where(outcomes.scores > 0, best[:, np.newaxis], 0)).all()
+    assert len(np.unique(best)) > 1
 
 
 @pytest.mark.parametrize("team_size", [1, 2])

@@ -9,8 +9,8 @@ from berteam_cli.selector.base import unordered_teams
 from berteam_cli.workers import Workers
 
 
-def rps(team_size):
-    return Games(Rps(team_size), Workers(1))
+def rps(team_size, sides=2):
+    return Games(Rps(team_size, sides), Workers(1))
 
 
 def test_rock_paper_scissors_is_a_cycle_of_equals():
@@ -33,7 +33,7 @@ def test_sides_are_kept_apart():
 def test_orders_of_the_members(games_per_pair, distinct):
     teams = np.array([[0, 1], [2, 3]])
     rng = np.random.default_rng(0)
-    ours, theirs = schedule(teams, np.array([0]), np.array([1]), games_per_pair, rng)
+    ours, theirs = schedule(teams, np.array([0]), np.array([1]), games_per_pair, 2, rng)
     assert ours.shape == (games_per_pair, 2)
     assert (np.sort(ours) == [0, 1]).all()
     assert (np.sort(theirs) == [2, 3]).all()
@@ -46,6 +46,40 @@ def test_orders_of_the_members(games_per_pair, distinct):
 
 def test_large_teams_stand_in_drawn_orders():
     teams = np.arange(10).reshape(2, 5)
-    ours, _ = schedule(teams, np.array([0]), np.array([1]), 20, np.random.default_rng(0))
+    ours, _ = schedule(teams, np.array([0]), np.array([1]), 20, 2, np.random.default_rng(0))
     assert (np.sort(ours) == np.arange(5)).all()
     assert len({tuple(team) for team in ours}) > 5
+
+
+def test_among_three_sides_either_team_stands_alone_on_each():
+    standings = tournament(rps(1, 3), fixed_policies(range(3)), unordered_teams(3, 1), 6, 0)
+    np.testing.assert_array_equal(
+        standings.outcomes.lineups.teams[:6, :, 0], [[0, 1, 1], [1, 0, 0], [1, 0, 1], [0, 1, 0], [1, 1, 0], [0, 0, 1]]
+    )
+    # Paper beats two rocks alone, and two papers share the win over one: three games of each kind.
+    np.testing.assert_array_equal(standings.results.sum(axis=1), [1 - np.eye(3)] * 3)
+    won, drawn, lost = standings.results.sum(axis=0)
+    np.testing.assert_array_equal(won, 3 * np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]))
+    np.testing.assert_array_equal(lost, won.T)
+    assert not drawn.any()
+    np.testing.assert_array_equal(standings.record, 2 * standings.results.sum(axis=0))
+    np.testing.assert_allclose(standings.elos, 1000, atol=1e-6)
+
+
+def test_an_order_of_the_members_is_kept_for_all_ways_to_hold_three_sides():
+    ours, theirs = schedule(np.array([[0, 1], [2, 3]]), np.array([0]), np.array([1]), 24, 6, np.random.default_rng(0))
+    lineups = [(*a, *b) for a, b in zip(ours, theirs, strict=True)]
+    assert len(set(lineups)) == 4
+    assert all(len(set(lineups[k : k + 6])) == 1 for k in range(0, 24, 6))
+
+
+def test_the_better_team_of_three_sides_has_the_higher_elo():
+    """Two different hands beat two of the three pairs of equal hands, among three sides too."""
+    teams = unordered_teams(3, 2)
+    standings = tournament(rps(2, 3), fixed_policies(range(3)), teams, 12, 0)
+    different = teams[:, 0] != teams[:, 1]
+    np.testing.assert_allclose(standings.elos[different], standings.elos[different][0], atol=1e-3)
+    assert standings.elos[different].min() > standings.elos[~different].max() + 50
+    won, drawn, lost = standings.record
+    np.testing.assert_array_equal(won + drawn + lost, 12 * (1 - np.eye(6)))
+    np.testing.assert_array_equal(won, lost.T)

@@ -2,9 +2,12 @@ import numpy as np
 import pytest
 
 from berteam_cli.acting import fixed_policies
+from berteam_cli.env.rps import Rps
 from berteam_cli.evaluation.reference import reference
 from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
+from berteam_cli.games import Games
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
+from berteam_cli.workers import Workers
 from tests.makers import mctf
 
 
@@ -126,3 +129,15 @@ def test_other_rules_have_another_yardstick():
     assert known.source.startswith("tournament of 3 teams")
     np.testing.assert_array_equal(known.teams[[0, -1]], [[0, 0], [6, 6]])
     assert known.elos.mean() == pytest.approx(1000)
+
+
+@pytest.mark.parametrize("sides", [3, 4])
+def test_the_fixed_teams_get_their_own_elos_back_among_more_sides(sides):
+    games = Games(Rps(2, sides), Workers(1))
+    known = reference(games, 28)
+    chosen = Chosen(known.teams, np.full(6, 1 / 6), np.ones(6, dtype=bool), np.zeros(6, dtype=int), 1.0)
+    found = truth(games, fixed_policies(range(3)), chosen, known, 2 * sides, np.random.default_rng(0))
+    assert np.ptp(known.elos) > 80
+    np.testing.assert_allclose(found.elos, known.elos, atol=3)  # but for the prior's pull to the mean
+    np.testing.assert_array_equal(found.wins + found.draws + found.losses, 12 * sides)
+    np.testing.assert_array_equal(found.draws > found.losses, found.elos > 1000)  # against itself a team draws

@@ -11,6 +11,12 @@ def test_by_hand():
     np.testing.assert_allclose(aggression(games), [(1 + 3 + 2 + 3) / 2, 1 / 5, 1])
 
 
+def test_all_opponents_of_three_sides_count():
+    events = [[[1, 2, 1, 0], [0, 0, 3, 0], [2, 2, 1, 0]]]
+    games = outcomes(np.zeros((1, 3, 2)), np.full((1, 3), 1 / 3), events=events)
+    np.testing.assert_allclose(aggression(games), [(1 + 3 + 2 + 4) / 2])
+
+
 def test_opponents_are_all_unordered_teams():
     teams = opponents((0, 2, 3, 5), 2)
     assert len(teams) == 10

@@ -13,6 +13,12 @@ def test_elo_is_conserved(games, fitness):
     assert after.sum() == pytest.approx(fitness.sum())
 
 
+@given(played(sides=3), floats(6))
+def test_elo_of_three_captains_is_conserved(games, fitness):
+    assert CaptainElo(32, 0).rated(fitness, games).sum() == pytest.approx(fitness.sum())
+    assert CaptainElo(0, 8).rated(fitness, games).sum() == pytest.approx(fitness.sum())
+
+
 @given(played(), floats(6))
 def test_elo_of_members_is_conserved(games, fitness):
     assert CaptainElo(0, 8).rated(fitness, games).sum() == pytest.approx(fitness.sum())
@@ -32,6 +38,33 @@ def test_captain_elo_by_hand():
     expected = 1 / (1 + 10 ** (-32 / 400))
     twice = rule.shown(rule.rated(np.zeros(4), won))
     np.testing.assert_allclose(twice, [1016 + 32 * (1 - expected), 1000, 984 - 32 * (1 - expected), 1000])
+
+
+def test_three_captains_by_hand():
+    rule = CaptainElo(30, 0)
+    teams, captains = [[[0], [1], [2]]], [[0, 1, 2]]
+    # Equals: each expected a third of the point.
+    for scores, gains in (([1, 0, 0], [20, -10, -10]), ([0.5, 0, 0.5], [5, -10, 5]), ([1 / 3] * 3, [0, 0, 0])):
+        after = rule.shown(rule.rated(np.zeros(3), outcomes(teams, [scores], captains)))
+        np.testing.assert_allclose(after, 1000 + np.array(gains), atol=1e-9)
+    # With odds of 3 : 1 : 1 they expect 0.6, 0.2 and 0.2.
+    strong = np.log([3.0, 1.0, 1.0])
+    after = rule.rated(strong, outcomes(teams, [[0, 1, 0]], captains))
+    np.testing.assert_allclose((after - strong) * 400 / np.log(10), [-18, 24, -6])
+
+
+def test_a_captain_of_two_of_three_sides_is_paid_for_both():
+    won = outcomes([[[0], [0], [1]]], [[1, 0, 0]], [[0, 0, 1]])
+    after = CaptainElo(30, 0).rated(np.zeros(2), won) * 400 / np.log(10)
+    np.testing.assert_allclose(after, [10, -10])
+
+
+def test_members_of_three_teams_by_hand():
+    # The teams' means are 1, 0 and 0 times ln 2: they expect 1/2, 1/4 and 1/4.
+    fitness = np.log(2.0) * np.array([2.0, 0, 0, 0])
+    drawn = outcomes([[[0, 1], [1, 2], [3, 3]]], [[1 / 3] * 3])
+    gains = (CaptainElo(0, 12).rated(fitness, drawn) - fitness) * 400 / np.log(10)
+    np.testing.assert_allclose(gains, [-2, -2 + 1, 1, 2], atol=1e-9)
 
 
 def test_member_elo_by_hand():

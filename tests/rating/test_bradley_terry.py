@@ -70,3 +70,48 @@ def test_anchored_and_free_fits_agree():
     elos, _ = ratings(scores, games)
     held, _ = held_ratings(scores[:1, 1:], games[:1, 1:], elos[1:])
     assert held[0] == pytest.approx(elos[0], abs=0.5)  # the prior pulls to a mean that is not quite the same
+
+
+def three_sided(strengths, games, seed):
+    """Points and games of players that each stood alone against two copies of each other, drawn from the softmax."""
+    rng = np.random.default_rng(seed)
+    odds = np.exp(strengths)
+    chances = odds[:, np.newaxis] / (odds[:, np.newaxis] + 2 * odds)
+    played = np.full(chances.shape, games) * (1.0 - np.eye(len(strengths)))
+    return rng.binomial(played.astype(int), chances).astype(float), played
+
+
+@given(st.integers(0, 2**32))
+def test_alone_or_in_copies_points_made_and_expected_balance(seed):
+    """O11 among three sides: sum of (S - Y) over all sides that a player held is 0."""
+    scores, games = three_sided(np.random.default_rng(seed).normal(size=4), 9, seed)
+    strengths = nats(ratings(scores, games, np.log(2))[0])
+    odds = np.exp(strengths)
+    alone = odds[:, np.newaxis] / (odds[:, np.newaxis] + 2 * odds)
+    own = (scores - games * alone).sum(axis=1)
+    copies = ((games - scores) - games * (1 - alone)).sum(axis=0)
+    assert (np.abs(own + copies) < PRIOR_DRAWS / 2).all()  # what the prior's draws add at most
+    assert (own + copies).sum() == pytest.approx(0, abs=1e-4)
+
+
+def test_a_tournament_of_three_sides_finds_the_strengths_that_made_it():
+    strengths = np.array([-1.0, -0.2, 0.3, 0.9])
+    scores, games = three_sided(strengths, 4_000_000, 0)
+    elos, widths = ratings(scores, games, np.log(2))
+    np.testing.assert_allclose(elos, points(strengths), atol=0.5)
+    assert (widths < 0.5).all()
+    # Without the handicap players seem equal who score a third of the points alone.
+    even, played = three_sided(np.zeros(2), 3_000_000, 1)
+    np.testing.assert_allclose(even[0, 1] / played[0, 1], 1 / 3, atol=0.001)
+    np.testing.assert_allclose(ratings(even, played, np.log(2))[0], 1000, atol=0.5)
+
+
+def test_held_ratings_with_a_handicap_by_hand():
+    """Alone against two copies and, with a copy of oneself, against one: a third and two thirds are expected."""
+    elos, _ = held_ratings(np.array([[2.0, 4.0]]), np.full((1, 2), 6.0), np.full(2, 1000.0), np.log([2, 0.5]))
+    assert elos[0] == pytest.approx(1000, abs=1e-6)
+    anchors = np.array([900.0, 1100.0])
+    shifted = anchors + points(np.log(2.0)) - 1000
+    one = held_ratings(np.array([[1.0, 2.0]]), np.full((1, 2), 6.0), anchors, np.log(2))
+    two = held_ratings(np.array([[1.0, 2.0]]), np.full((1, 2), 6.0), shifted)
+    np.testing.assert_allclose(one, two)

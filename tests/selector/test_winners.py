@@ -110,6 +110,15 @@ def test_both_teams_of_a_draw_are_harvested_with_their_weight():
     assert weights.tolist() == [1, 0.25, 0.25, 1]
 
 
+def test_sides_that_share_a_draw_are_harvested_however_they_share_it():
+    scores = [[1, 0, 0], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]]
+    three_sides = outcomes_of(np.arange(9).reshape(3, 3, 1), scores)
+    teams, weights = harvest(three_sides, 0.25, 13.0, None)
+    assert teams.ravel().tolist() == [0, 3, 5, 6, 7, 8]
+    assert weights.tolist() == [1] + [0.25] * 5
+    assert harvest(three_sides, 0.0, 13.0, None)[0].tolist() == [[0]]
+
+
 def test_inverse_probability_weights_by_hand():
     chances = np.log([[0.05, 1], [0.02, 0.5], [1, 0.0001]])  # of 100 ordered teams
     teams, weights = harvest(outcomes_of(*THREE_GAMES, chances), 0.5, 13.0, 10)
