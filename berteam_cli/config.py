@@ -336,6 +336,7 @@ class TrainConfig(CommandConfig):
     device: str = choice("cpu", "cuda", "auto")
     record_every: int = number(1)
     record_teams: int = number(1)
+    payoff_steps: int = number()
     checkpoint_every: int = number(1)
     selector: SelectorConfig = MISSING
     optimizer: OptimizerConfig = MISSING

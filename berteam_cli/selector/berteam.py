@@ -168,6 +168,11 @@ class Berteam:
         )
         return replace(after, learnt=learnt), Selecting(minibatches, loss, len(winners))
 
+    def embeddings(self, state: BerteamState) -> Floats:
+        """Returns (N, width) the token of each member, from which the network begins."""
+        tokens = state.learnt.weights["tokens.weight"]
+        return tokens[: self.field.members].cpu().numpy().astype(np.float64)
+
     def tensors(self, state: BerteamState) -> dict[str, Any]:
         """Returns all that ``state`` holds as named tensors, without copies."""
         learnt, winners = state.learnt, state.winners
