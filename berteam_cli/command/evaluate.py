@@ -181,6 +181,9 @@ def show_points(console: Console, rows: list[tuple[Any, ...]], points: Points, t
     )
     console.print(printed("Mixes: exploitability, total variation from what was learnt", mixes))
     console.print(f"Of all Nash equilibria of wins less losses this is {points.equilibrium.which}.", highlight=False)
+    unbeaten = [team_name(points.learned.teams[k]) for k in np.flatnonzero(~points.played.wins.any(axis=0))]
+    listed = ", ".join(unbeaten[:top]) + (f" and {len(unbeaten) - top} more" if len(unbeaten) > top else "")
+    console.print(f"Teams that never lost: {listed or 'none'}.", highlight=False)
 
 
 def likeness(run: Run, parts: Parts, rng: Generator) -> Tables:

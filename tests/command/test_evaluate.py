@@ -44,8 +44,9 @@ def test_reference_points_of_rock_paper_scissors(berteam, tmp_path):
 def test_reference_points_of_fixed_policies(berteam, tmp_path):
     words = [*SMALL_BERTEAM, "epochs=2", "games_per_epoch=4", "evaluation.games=0", "payoff_steps=0"]
     berteam("train", "population=fixed_policies", "optimizer=fixed", *words, "out=run")
-    berteam("evaluate", "run")
+    said = berteam("evaluate", "run").stdout
     table = read(tmp_path / "run", "reference_points").set_index("team")
+    assert f"Teams that never lost: {', '.join(sorted(table.index[table.most_lost == 0]))}." in said
     assert len(table) == 28
     for mix in ("probability", "fixed_point", "replicator", "nash"):
         assert table[mix].sum() == pytest.approx(1)
