@@ -26,6 +26,7 @@ WORDS = {
     "tournament": "every team against every other",
     "replay": "one game as a page for the browser or as a GIF",
     "export": "a member as a file that Stable-Baselines3 loads",
+    "evaluate": "where choosing among a run's teams ends in theory, and who is alike",
     "inspect": "the tables of a run in the terminal",
     "list": "what can be chosen",
 }
@@ -70,7 +71,7 @@ def run(word: str, words: list[str]) -> None:
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
     commands = {"train": composed, "tournament": composed, "replay": replay}
-    commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing}
+    commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing, "evaluate": evaluate}
     commands[word](word, words)
 
 
@@ -249,6 +250,24 @@ def inspect(word: str, words: list[str]) -> None:
     from berteam_cli.command.inspect import inspect as look  # noqa: PLC0415
 
     look(given.run, given.top)
+
+
+def evaluate(word: str, words: list[str]) -> None:
+    """Compares a run with where choosing among its teams ends in theory, and members with each other."""
+    given = reader(
+        word,
+        words,
+        run={"type": Path, "help": "folder of the run"},
+        __top={"type": int, "default": 10, "help": "rows of each table (10)"},
+        __most={"type": int, "default": 300, "help": "so many teams at most play each other (300)"},
+        __games={"type": int, "default": 8, "help": "games of each two teams (8: all orders of teams of two)"},
+    )
+    for name, least in (("top", 1), ("most", 0), ("games", 1)):
+        if getattr(given, name) < least:
+            raise InputError(f"--{name} must be >= {least}, but is {getattr(given, name)}.")
+    from berteam_cli.command.evaluate import evaluate as compare  # noqa: PLC0415
+
+    compare(given.run, given.top, given.most, given.games)
 
 
 def listing(word: str, words: list[str]) -> None:

@@ -354,6 +354,7 @@ class TrainConfig(CommandConfig):
     games_per_epoch: int = number(1)
     device: str = choice("cpu", "cuda", "auto")
     record_every: int = number(1)
+    payoff_steps: int = number()
     checkpoint_every: int = number(1)
     selector: SelectorConfig = MISSING
     optimizer: OptimizerConfig = MISSING

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from berteam_cli.errors import InputError, RunError
-from berteam_cli.records import COLUMNS
+from berteam_cli.records import COLUMNS, EVALUATION
 
 MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
 PACKAGES = ("berteam-cli", "torch", "numpy", "numba", "pandas", "stable-baselines3", "pettingzoo", "hydra-core")
@@ -45,7 +45,8 @@ def claim(folder: Path, on_exists: str) -> None:
                 f"or on_exists=overwrite to replace it, or on_exists=resume to go on with it."
             )
         for name in (*(f"{table}.csv" for table in COLUMNS), MANIFEST, CONFIG, LOG, ERROR):
-            (folder / name).unlink(missing_ok=True)
+            for place in (folder, folder / EVALUATION):
+                (place / name).unlink(missing_ok=True)
         shutil.rmtree(folder / "checkpoint", ignore_errors=True)
     made = missing(folder)
     try:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.learner.base import LEARNING_FIGURES
 from berteam_cli.outcomes import SIDES, Outcomes
 from berteam_cli.population import island_of, names
@@ -33,28 +34,31 @@ class Recorder:
         tables: of the run folder.
         parts: of the run.
         every: epochs between two records of members and distributions.
+        exploiting: measures how exploitable a distribution is.
     """
 
     tables: Tables
     parts: Parts
     every: int
+    exploiting: Exploiting
 
     def epoch(self, run: Run, report: Report) -> None:
         """Records an epoch, and after every ``every``-th one the state it led to."""
         clock = Clock()
         selecting = report.selecting
-        entropy = effective = math.nan
+        entropy = effective = exploited = math.nan
         if run.epoch % self.every == 0:
-            entropy = self.state(run).entropy
+            distribution = self.state(run)
+            entropy = distribution.entropy
             effective = math.exp(entropy)
+            exploited = self.exploiting.of(run, distribution)
         self.tables.add("games", game_rows(run.epoch, report.outcomes))
         if self.parts.games.env.sides > 2:
             self.tables.add(SIDES_TABLE, side_rows(run.epoch, report.outcomes))
         self.tables.add("learning", self.learning_rows(run, report))
         self.tables.add("generations", self.generation_rows(run, report))
-        self.tables.add(
-            "selector", [(run.epoch, selecting.loss, selecting.updates, selecting.buffer, effective, entropy)]
-        )
+        figures = (selecting.loss, selecting.updates, selecting.buffer, effective, entropy, exploited)
+        self.tables.add("selector", [(run.epoch, *figures)])
         clock.lap("record_s")
         seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
         self.tables.add("timing", [tuple(seconds[column] for column in COLUMNS["timing"])])

@@ -39,7 +39,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("epoch", "island", "removed", "parent", "removed_fitness", "parent_fitness", "removed_age", "reason"),
     ),
     "learning": ("epoch", "agent", "algorithm", *LEARNING_FIGURES),
-    "selector": ("epoch", "loss", "updates", "buffer", "effective_teams", "entropy"),
+    "selector": ("epoch", "loss", "updates", "buffer", "effective_teams", "entropy", "exploitability"),
     "timing": (
         *("epoch", "select_s", "play_s", "learn_s", "renew_s", "selector_s", "record_s", "env_steps", "probe_s"),
     ),
@@ -48,6 +48,12 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("games", "env_steps", "wall_s", "peak_rss_mib"),
     ),
     "pairs": ("team", "opponent", "games", "wins", "draws", "losses", "side"),
+    "reference_points": (
+        *("epoch", "team", "members", "probability", "fixed_point", "replicator", "nash"),
+        *("against_mix", "worst", "most_lost"),
+    ),
+    "embeddings": ("epoch", "group", "members", "pairs", "cosine", "above_all"),
+    "neighbours": ("epoch", "agent", "name", "rank", "neighbour", "neighbour_name", "cosine"),
 }
 GROWING = (
     *("agents", "team_distribution", "captain_distribution", "island_distribution"),
@@ -56,6 +62,8 @@ GROWING = (
 """Tables that get rows in every epoch, or in every recorded one."""
 SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row in "games" has no room for all
 BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
+EVALUATION = "evaluation"
+"""The folder in a run's, where `berteam evaluate` writes."""
 
 
 def team_name(team: Iterable[int]) -> str:

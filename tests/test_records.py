@@ -21,12 +21,12 @@ def test_floats_read_back_to_the_same_bits(value):
 
 def test_tables_are_cut_back_to_where_a_checkpoint_was(tmp_path):
     tables = Tables(tmp_path)
-    tables.add("selector", [(1, 0.5, 2, 3, math.nan, math.nan)])
+    tables.add("selector", [(1, 0.5, 2, 3, math.nan, math.nan, math.nan)])
     sizes = tables.sizes()
-    tables.add("selector", [(2, 0.25, 2, 3, 1.0, 0.0)])
+    tables.add("selector", [(2, 0.25, 2, 3, 1.0, 0.0, 0.5)])
     tables.close()
     again = Tables(tmp_path, sizes)
-    again.add("selector", [(2, 0.125, 1, 1, 2.0, 1.0)])
+    again.add("selector", [(2, 0.125, 1, 1, 2.0, 1.0, 0.5)])
     again.close()
     table = pd.read_csv(tmp_path / "selector.csv")
     assert list(table.columns) == list(COLUMNS["selector"])

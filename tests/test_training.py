@@ -18,7 +18,7 @@ def parts(*overrides):
     return build.parts(checked(composed(*RPS, *overrides)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Witness(Uniform):
     """A uniform selector that remembers what it was asked and told."""
 
@@ -29,9 +29,9 @@ class Witness(Uniform):
         self.asked.append((games, ages.copy()))
         return super().select(state, games, ages, rng)
 
-    def learn(self, state, outcomes, rng):
+    def learn(self, state, outcomes, seen, fitness, rng):
         self.told.append(outcomes)
-        return super().learn(state, outcomes, rng)
+        return super().learn(state, outcomes, seen, fitness, rng)
 
 
 def test_the_selector_is_asked_with_the_ages_and_told_the_outcomes():

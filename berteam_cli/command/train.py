@@ -12,6 +12,7 @@ from berteam_cli.command.inspect import show
 from berteam_cli.config import TrainConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
+from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder
 from berteam_cli.memory import spoken, state_bytes
 from berteam_cli.pace import Pace
@@ -85,7 +86,7 @@ def trained(
 ) -> tuple[Run, Recorder]:
     """Runs the epochs; returns the run after the last one, and what recorded it."""
     tables = Tables(folder, saved.table_sizes if saved else None, also_growing(parts))
-    recorder = Recorder(tables, parts, config.record_every)
+    recorder = Recorder(tables, parts, config.record_every, Exploiting(parts, config.payoff_steps))
     seconds = saved.seconds if saved else 0.0
     run = saved.run if saved else begin(parts)
 

@@ -227,8 +227,8 @@ def exactly(field: Field) -> bool:
 def measured(selector: Selector[Any], state: Any, rng: Generator, **side: int) -> TeamDistribution:
     """Returns the distribution over teams: exact where ``exactly`` says so, else that of drawn ones.
 
-    With ``side`` that for one side, of a selector that tells them apart. A sampled distribution lists the ``exact_limit`` most frequent teams with the standard errors of their shares; the
-    rest is its ``other``.
+    With ``side`` it is that for one side, of a selector that tells them apart. A sampled distribution lists the
+    ``exact_limit`` most frequent teams with the standard errors of their shares; the rest is its ``other``.
     """
     if exactly(selector.field):
         return selector.distribution(state, **side)

@@ -9,7 +9,7 @@ from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.selector.base import Field, TeamDistribution, most_probable, orderings, unordered_teams
 from berteam_cli.selector.beam import likeliest
 from berteam_cli.selector.chances import total_distribution
-from berteam_cli.selector.filling import Odds, drawn
+from berteam_cli.selector.filling import Odds, drawn, within
 
 
 def sampled(chances: Floats, count: int, rng: Generator) -> Ints:
@@ -38,6 +38,14 @@ def distribution(chances: Floats, field: Field) -> TeamDistribution:
         probability = total_distribution(odds_of(chances), field, 0, exchangeable=False)
     possible = probability > 0
     return TeamDistribution(teams[possible], probability[possible])
+
+
+def every_team(listed: TeamDistribution, field: Field) -> TeamDistribution:
+    """Returns the exact distribution ``listed`` with a row for each team that may be, also where its chance is 0."""
+    uniform = within(np.full((field.team_size, field.members), 1 / field.members), field.allowed)
+    teams = distribution(uniform, field).teams
+    chance = dict(zip(map(tuple, listed.teams), listed.probability, strict=True))
+    return TeamDistribution(teams, np.array([chance.get(tuple(team), 0.0) for team in teams]))
 
 
 def top(chances: Floats, field: Field, count: int, rng: Generator, *, listed: bool) -> TeamDistribution:

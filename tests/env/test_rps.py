@@ -12,6 +12,7 @@ from berteam_cli.workers import Workers
 from rps import HANDS, hands_beaten
 from tests.makers import random_networks
 from tests.selector.test_berteam import LEARNER, begun, far, made
+from tests.strategies import UNSEEN
 
 FIXED = fixed_policies(range(3))
 EQUILIBRIA = {1: [1 / 3] * 3, 2: [0.0 if a == b else 1 / 3 for a, b in unordered_teams(3, 2)]}
@@ -137,7 +138,7 @@ def learnt(selector, state, epochs, games=1000):
     for epoch in range(epochs):
         lineups = selector.select(state, games, np.zeros(3), rng)
         outcomes, _ = played.play(FIXED, lineups, epoch)
-        state, _ = selector.learn(state, outcomes, rng)
+        state, _ = selector.learn(state, outcomes, UNSEEN, np.zeros(3), rng)
         seen.append(selector.distribution(state).probability)
     return np.mean(seen[epochs // 2 :], axis=0)
 

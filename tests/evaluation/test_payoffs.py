@@ -1,0 +1,87 @@
+from itertools import product
+
+import numpy as np
+import pytest
+
+from berteam_cli.acting import fixed_policies, joined
+from berteam_cli.env.rps import Rps
+from berteam_cli.evaluation import payoffs as module
+from berteam_cli.evaluation.payoffs import payoff_steps, payoffs
+from berteam_cli.evaluation.tournament import tournament
+from berteam_cli.games import Games, pairings
+from berteam_cli.selector.base import unordered_teams
+from berteam_cli.workers import Workers
+from tests.makers import mctf, random_networks
+
+CYCLE = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])  # rock, paper, scissors: paper beats rock ...
+
+
+def rps(team_size, workers=1):
+    return Games(Rps(team_size), Workers(workers))
+
+
+def test_rock_paper_scissors():
+    played = payoffs(rps(1), fixed_policies(range(3)), unordered_teams(3, 1), 2, np.random.default_rng(0))
+    np.testing.assert_array_equal(played.wins, CYCLE)
+    np.testing.assert_array_equal(played.draws, np.eye(3))
+    np.testing.assert_array_equal(played.zero_sum, CYCLE - CYCLE.T)
+    np.testing.assert_array_equal(played.scores, CYCLE + np.eye(3) / 2)
+
+
+def test_pairs_of_hands():
+    teams = unordered_teams(3, 2)
+    played = payoffs(rps(2), fixed_policies(range(3)), teams, 8, np.random.default_rng(0))
+    beaten = np.array(
+        [[sum(any((a - b) % 3 == 1 for a in ours) for b in theirs) for theirs in teams] for ours in teams]
+    )
+    np.testing.assert_array_equal(played.wins, beaten > beaten.T)
+    np.testing.assert_array_equal(played.draws, beaten == beaten.T)
+
+
+def test_both_sides_and_all_orders_are_in_it():
+    games, acting = mctf(), fixed_policies([0, 2, 3])
+    teams = np.array([[0, 1], [1, 2]])
+    whole = payoffs(games, acting, teams, 8, np.random.default_rng(0))
+    ours, theirs = [(0, 1), (1, 0)], [(1, 2), (2, 1)]
+    blue, red = (np.array(x) for x in zip(*product(ours, theirs), strict=True))
+    as_blue = games.play(acting, pairings(blue, red), 0)[0].scores[:, 0]
+    as_red = games.play(acting, pairings(red, blue), 0)[0].scores[:, 1]
+    assert whole.scores[0, 1] == pytest.approx(np.mean([as_blue, as_red]))
+    assert whole.wins[0, 1] == pytest.approx(np.mean([as_blue == 1, as_red == 1]))
+
+
+@pytest.mark.parametrize("games_per_pair", [1, 3, 8])
+def test_what_holds_of_any_teams(games_per_pair):
+    games = mctf()
+    acting = joined([random_networks(3, games.env, scale=3.0), fixed_policies([2, 5, 6])])
+    played = payoffs(games, acting, unordered_teams(6, 2)[::4], games_per_pair, np.random.default_rng(1))
+    np.testing.assert_allclose(played.wins + played.wins.T + played.draws, 1, atol=1e-12)
+    np.testing.assert_array_equal(played.draws, played.draws.T)
+    np.testing.assert_array_equal(played.zero_sum, -played.zero_sum.T)
+    np.testing.assert_allclose(played.scores + played.scores.T, 1, atol=1e-12)
+    assert (played.wins > 0).any()
+
+
+def test_it_agrees_with_a_tournament():
+    games, teams, acting = mctf(), unordered_teams(3, 2), fixed_policies([0, 2, 5])
+    played = payoffs(games, acting, teams, 8, np.random.default_rng(0))
+    won, drawn, _ = tournament(games, acting, teams, 8, 0).results.sum(axis=0) / 8
+    other = ~np.eye(len(teams), dtype=bool)
+    np.testing.assert_array_equal(played.wins[other], won[other])
+    np.testing.assert_array_equal(played.draws[other], drawn[other])
+    assert (won > 0).any()
+
+
+def test_neither_the_workers_nor_the_batches_change_the_chances_of_fixed_policies(monkeypatch):
+    def measured(workers):
+        acting = fixed_policies(range(3))
+        return payoffs(rps(2, workers), acting, unordered_teams(3, 2), 8, np.random.default_rng(0)).wins
+
+    whole = measured(1)
+    np.testing.assert_array_equal(whole, measured(2))
+    monkeypatch.setattr(module, "BATCH", 16)
+    np.testing.assert_array_equal(whole, measured(1))
+
+
+def test_steps():
+    assert payoff_steps(28, 8, 420) == 406 * 8 * 420
