@@ -3,7 +3,7 @@ import pytest
 
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
-from berteam_cli.evaluation.reference import reference
+from berteam_cli.evaluation.reference import Reference, reference
 from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
 from berteam_cli.games import Games
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
@@ -141,3 +141,14 @@ def test_the_fixed_teams_get_their_own_elos_back_among_more_sides(sides):
     np.testing.assert_allclose(found.elos, known.elos, atol=3)  # but for the prior's pull to the mean
     np.testing.assert_array_equal(found.wins + found.draws + found.losses, 12 * sides)
     np.testing.assert_array_equal(found.draws > found.losses, found.elos > 1000)  # against itself a team draws
+
+
+@pytest.mark.parametrize("sides", [3, 5])
+def test_alone_a_share_of_the_points_is_what_an_equal_scores(sides):
+    """One game, rock alone against rocks: it draws, and scores the 1 / S that it is expected to."""
+    games = Games(Rps(1, sides), Workers(1))
+    one = Chosen(np.zeros((1, 1), dtype=int), np.ones(1), np.ones(1, dtype=bool), np.zeros(1, dtype=int), 1.0)
+    rocks = Reference(np.zeros((1, 1), dtype=int), np.full(1, 1000.0), "by hand")
+    found = truth(games, fixed_policies(range(3)), one, rocks, 1, np.random.default_rng(0))
+    assert found.elos[0] == pytest.approx(1000, abs=1e-6)
+    assert (found.wins[0], found.draws[0], found.losses[0]) == (0, 1, 0)
