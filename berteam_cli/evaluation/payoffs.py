@@ -58,7 +58,7 @@ def payoffs(games: Games, policies: Policies, teams: Ints, games_per_pair: int, 
     pairs = max(1, BATCH // games_per_pair)
     for start in range(0, len(first), pairs):
         i, j = first[start : start + pairs], second[start : start + pairs]
-        lineups = both_sides(*schedule(teams, i, j, games_per_pair, rng), games_per_pair)
+        lineups = both_sides(*schedule(teams, i, j, games_per_pair, 2, rng), games_per_pair)
         outcomes, _ = games.play(policies, lineups, int(rng.integers(2**63)))
         scores = as_side_0(outcomes, games_per_pair).scores[:, 0].reshape(len(i), games_per_pair)
         counts[:, i, j] = [(scores == result).sum(axis=1) for result in (1.0, 0.5, 0.0)]

@@ -59,6 +59,6 @@ def test_berteam_has_a_vector_for_each_member_and_mcaa_none():
     state = selector.init(np.random.default_rng(0))
     vectors = selector.embeddings(state)
     assert vectors.shape == (5, 8)
-    np.testing.assert_array_equal(vectors, state.learnt.weights["tokens.weight"][:5].numpy())
+    np.testing.assert_array_equal(vectors, state.learnt[0].weights["writer.tokens.weight"][:5].numpy())
     assert isinstance(selector, Embedding)
     assert not isinstance(Mcaa(selector.field, 0.01, 1), Embedding)
