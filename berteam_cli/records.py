@@ -52,6 +52,8 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("epoch", "team", "members", "probability", "fixed_point", "replicator", "nash"),
         *("against_mix", "worst", "most_lost"),
     ),
+    "conditioning": ("epoch", "choice", "elo", "elo_low", "elo_high"),
+    "encounters": ("epoch", "opponent", "encounters", "score_before", "score_after"),
     "embeddings": ("epoch", "group", "members", "pairs", "cosine", "above_all"),
     "neighbours": ("epoch", "agent", "name", "rank", "neighbour", "neighbour_name", "cosine"),
 }

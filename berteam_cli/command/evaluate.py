@@ -17,6 +17,7 @@ from berteam_cli.command.inspect import printed
 from berteam_cli.config import checked
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError, RunError
+from berteam_cli.evaluation.conditioning import Encounters, encounters
 from berteam_cli.evaluation.equilibria import (
     Equilibrium,
     exploitability,
@@ -26,7 +27,7 @@ from berteam_cli.evaluation.equilibria import (
     total_variation,
 )
 from berteam_cli.evaluation.payoffs import Payoffs, payoffs
-from berteam_cli.evaluation.reference import reference_teams
+from berteam_cli.evaluation.reference import reference, reference_teams
 from berteam_cli.folder import read_manifest
 from berteam_cli.optimizer.aggression import aggression
 from berteam_cli.outcomes import Floats
@@ -40,6 +41,7 @@ from berteam_cli.training import PAYOFFS, Parts, Probes, Run, generator, key
 
 STEPS = 10_000  # of the replicator, after which it has settled
 NEIGHBOURS = 5
+OPPONENTS, ENCOUNTERS = 28, 40  # at most so many fixed teams are met, so many times each
 PROBES, PROBE_TEAMS = 2, 28  # games against each of so many teams of fixed policies, to tell aggression
 
 Tables = dict[str, list[tuple[Any, ...]]]
@@ -65,7 +67,7 @@ def evaluate(folder: Path, top: int, most: int, games_per_pair: int) -> None:
         raise InputError(str(error)) from error
     console = Console(width=None if Console().is_terminal else 120)
     console.print(f"{folder} after epoch {run.epoch}", highlight=False)
-    playing, looking = generator(parts.seed, PAYOFFS, run.epoch).spawn(2)
+    playing, looking, meeting = generator(parts.seed, PAYOFFS, run.epoch).spawn(3)
     tables: Tables = {}
     learned = learned_mix(run, parts, most, playing)
     if isinstance(learned, str):
@@ -81,6 +83,12 @@ def evaluate(folder: Path, top: int, most: int, games_per_pair: int) -> None:
         console.print(printed(title, pd.DataFrame(rows, columns=COLUMNS["embeddings"][1:])))
     else:
         console.print("The selector has no embeddings of members to compare.", highlight=False)
+    if parts.selector.answers and parts.selector.field.sides == 2:
+        found = encounters(run, parts, reference(parts.games, OPPONENTS), ENCOUNTERS, meeting)
+        tables |= conditioning_rows(run, found)
+        rows = [row[1:] for row in tables["conditioning"]]
+        title = f"Elo of the choice before and after a first game, {ENCOUNTERS} encounters with each fixed team"
+        console.print(printed(title, pd.DataFrame(rows, columns=COLUMNS["conditioning"][1:])))
     for path in written(folder / EVALUATION, tables):
         console.print(str(path), highlight=False, soft_wrap=True)
 
@@ -187,6 +195,17 @@ def show_points(console: Console, rows: list[tuple[Any, ...]], points: Points, t
     unbeaten = [team_name(points.learned.teams[k]) for k in np.flatnonzero(~points.played.wins.any(axis=0))]
     listed = ", ".join(unbeaten[:top]) + (f" and {len(unbeaten) - top} more" if len(unbeaten) > top else "")
     console.print(f"Teams that never lost: {listed or 'none'}.", highlight=False)
+
+
+def conditioning_rows(run: Run, found: Encounters) -> Tables:
+    """Returns the rows of conditioning.csv and encounters.csv."""
+    opponents = [team_name(team) for team in found.reference.teams]
+    means = zip(opponents, found.before.mean(axis=1), found.after.mean(axis=1), strict=True)
+    each = found.before.shape[1]
+    return {
+        "conditioning": [(run.epoch, choice, *elo) for choice, elo in found.elos().items()],
+        "encounters": [(run.epoch, opponent, each, before, after) for opponent, before, after in means],
+    }
 
 
 def likeness(run: Run, parts: Parts, rng: Generator) -> Tables:

@@ -134,9 +134,14 @@ class Berteam:
         field, looking = self.field, self.observations
         networks = field.sides if self.side == "separate" else 1
         rings = field.sides if self.dataset == "per_side" else 1
-        nobody = no_winners(self.capacity, field.team_size, looking.rows, looking.numbers)
         device = torch.device(self.device)
-        return BerteamState(tuple(untrained(self._built(rng), device) for _ in range(networks)), (nobody,) * rings, 0)
+        return BerteamState(
+            tuple(untrained(self._built(rng), device) for _ in range(networks)),
+            tuple(
+                no_winners(self.capacity, field.team_size, looking.rows, looking.numbers) for _ in range(rings)
+            ),  # a memory of its own for each: a checkpoint takes no tensor twice
+            0,
+        )
 
     def select(self, state: BerteamState, games: int, ages: Ints, rng: Generator) -> Lineups:
         """Returns captains by the scheme, and around each a team that the network completes, with noise.
