@@ -23,6 +23,8 @@ LARGEST_WEIGHTED = 8  # T; a team's chance is a sum over 2^T partial teams
 
 CPU = torch.device("cpu")
 
+KINDS = ("weights", "means", "squares", "averages")  # of tensors that the network learns
+
 
 @dataclass(frozen=True)
 class BerteamState:
@@ -57,6 +59,8 @@ class Berteam:
         weight_half_life: wins after which a remembered team counts half; 0 for never.
         draw_weight: weight of each team of a draw; 0 leaves draws out.
         learning_rate: Adam's.
+        averaging: in [0, 1); teams are chosen with a mean of the weights after each gradient step, in which each counts
+            so much of the next. 0 chooses with the newest weights.
         layers: of the encoder, and of the decoder.
         width: numbers in a token.
         heads: of each attention; divides ``width``.
@@ -77,6 +81,7 @@ class Berteam:
     weight_half_life: float
     draw_weight: float
     learning_rate: float
+    averaging: float
     layers: int
     width: int
     heads: int
@@ -165,17 +170,14 @@ class Berteam:
             size=self.minibatch_size,
             weight_half_life=self.weight_half_life,
             learning_rate=self.learning_rate,
+            averaging=self.averaging,
         )
         return replace(after, learnt=learnt), Selecting(minibatches, loss, len(winners))
 
     def tensors(self, state: BerteamState) -> dict[str, Any]:
         """Returns all that ``state`` holds as named tensors, without copies."""
         learnt, winners = state.learnt, state.winners
-        named = {
-            f"{kind}.{name}": value
-            for kind in ("weights", "means", "squares")
-            for name, value in getattr(learnt, kind).items()
-        }
+        named = {f"{kind}.{name}": value for kind in KINDS for name, value in getattr(learnt, kind).items()}
         counts = {"steps": learnt.steps, "pushed": winners.pushed, "epochs": state.epochs}
         return {
             **named,
@@ -186,7 +188,7 @@ class Berteam:
 
     def restored(self, tensors: dict[str, Any]) -> BerteamState:
         """Returns the state that ``tensors`` gave these."""
-        named: dict[str, dict[str, torch.Tensor]] = {"weights": {}, "means": {}, "squares": {}}
+        named: dict[str, dict[str, torch.Tensor]] = {kind: {} for kind in KINDS}
         for name, value in tensors.items():
             kind, _, parameter = name.partition(".")
             if kind in named:
@@ -218,7 +220,7 @@ class Berteam:
 
     def _odds(self, state: BerteamState) -> Odds:
         """Returns the conditionals of the network in ``state``."""
-        return odds_of(self._network, state.learnt.weights)
+        return odds_of(self._network, state.learnt.used)
 
     def _open(self, count: int) -> Ints:
         """Returns (count, T) teams that nobody stands in yet."""

@@ -28,6 +28,7 @@ SMALL = {
     "weight_half_life": 0.0,
     "draw_weight": 0.0,
     "learning_rate": 1e-3,
+    "averaging": 0.0,
     "layers": 1,
     "width": 16,
     "heads": 2,
@@ -139,6 +140,19 @@ def test_captains_stand_where_the_network_likes_them():
         at_first = expected * then[0, 1, 1 - member]  # captain at place 0 and the other behind
         share = np.mean((teams[:, 0] == member) & (teams[:, 1] != member))
         assert abs(share - at_first) < 5 * 0.5 / np.sqrt(len(teams))
+
+
+def test_teams_are_chosen_with_the_averages_where_there_are_any():
+    selector = made(averaging=0.9)
+    state, rng = selector.init(np.random.default_rng(0)), np.random.default_rng(1)
+    for _ in range(5):
+        state, _ = selector.learn(state, same_winner(selector, [3, 1]), rng)
+    learnt = state.learnt
+    as_if = replace(state, learnt=replace(learnt, weights=learnt.averages, averages={}))
+    newest = replace(state, learnt=replace(learnt, averages={}))
+    chosen, expected, other = (selector.distribution(x).probability for x in (state, as_if, newest))
+    assert np.array_equal(chosen, expected)
+    assert not np.allclose(chosen, other)
 
 
 def test_new_members_fill_places_the_network_would_not_give_them():
@@ -276,15 +290,16 @@ def test_a_single_winner_becomes_almost_certain():
     assert total.probability[np.all(total.teams == [1, 3], axis=1)] > 0.9
 
 
-def test_a_restored_state_goes_on_as_if_nothing_had_happened():
-    selector = made(weighting=True)
+@pytest.mark.parametrize("averaging", [0.0, 0.9])
+def test_a_restored_state_goes_on_as_if_nothing_had_happened(averaging):
+    selector = made(weighting=True, averaging=averaging)
     rng = np.random.default_rng(0)
     state = selector.init(rng)
     for _ in range(3):
         lineups = selector.select(state, 6, np.arange(4), rng)
         state, _ = selector.learn(state, played(lineups, np.full((16, 16), 0.5)), rng)
     saved = {name: value.clone() for name, value in selector.tensors(state).items()}
-    other = made(weighting=True)
+    other = made(weighting=True, averaging=averaging)
     again = other.restored(saved)
     assert byte_string(other, again) == byte_string(selector, state)
     for _ in range(2):
