@@ -359,19 +359,6 @@ def test_weighting_fits_win_rates_and_no_weighting_the_replicator(weighting):
     assert far(ordered(selector, state), fit[weighting]) < 0.05
 
 
-def test_weighted_learning_settles_where_shares_are_win_rates():
-    selector, wins = made(weighting=True, **LEARNER | {"batch_size": 1024}), win_matrix(1)
-    state, rng = begun(selector), np.random.default_rng(0)
-    fixed = np.full(16, 1 / 16)
-    for _ in range(100):
-        fixed = wins @ fixed / (wins @ fixed).sum()
-    assert far(ordered(selector, state), fixed) > 0.2
-    for epoch in range(60):
-        lineups = selector.select(state, 2000, np.zeros(4), rng)
-        state, _ = selector.learn(state, played(lineups, wins, seed=epoch), rng)
-    assert far(ordered(selector, state), fixed) < 0.05
-
-
 # --- settings
 
 
