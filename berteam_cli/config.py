@@ -179,6 +179,7 @@ class BerteamConfig(SelectorConfig):
     weight_half_life: float = number()
     draw_weight: float = number(0, 1)
     learning_rate: float = number(open_low=True)
+    averaging: float = number(0, 0.9999)
     layers: int = number(1, 64)
     width: int = number(1, 8192)
     heads: int = number(1, 1024)

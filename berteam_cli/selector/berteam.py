@@ -61,6 +61,8 @@ class Berteam:
         weight_half_life: wins after which a remembered team counts half; 0 for never.
         draw_weight: weight of each team of a draw; 0 leaves draws out.
         learning_rate: Adam's.
+        averaging: in [0, 1); teams are chosen with a mean of the weights after each gradient step, in which each counts
+            so much of the next. 0 chooses with the newest weights.
         layers: of the encoder, and of the decoder.
         width: numbers in a token.
         heads: of each attention; divides ``width``.
@@ -84,6 +86,7 @@ class Berteam:
     weight_half_life: float
     draw_weight: float
     learning_rate: float
+    averaging: float
     layers: int
     width: int
     heads: int
@@ -249,6 +252,7 @@ class Berteam:
                     self._loss,
                     rng,
                     learning_rate=self.learning_rate,
+                    averaging=self.averaging,
                 )
                 losses.append(loss)
         steps = len(losses) * self.batch_size // self.minibatch_size
@@ -274,7 +278,7 @@ class Berteam:
 
     def embeddings(self, state: BerteamState) -> Floats:
         """Returns (N, width) the token of each member; the mean over networks where each side has its own."""
-        tokens = [learnt.weights["writer.tokens.weight"][: self.field.members] for learnt in state.learnt]
+        tokens = [learnt.used["writer.tokens.weight"][: self.field.members] for learnt in state.learnt]
         return torch.stack(tokens).mean(dim=0).double().cpu().numpy()
 
     @cached_property
@@ -326,8 +330,8 @@ class Berteam:
             seen: (U,) what the members saw; None for nothing.
         """
         if self.side != "separate":
-            return odds_of(self._network, state.learnt[0].weights, sides, seen)
-        own = [odds_of(self._network, x.weights, np.zeros_like(sides), seen) for x in state.learnt]
+            return odds_of(self._network, state.learnt[0].used, sides, seen)
+        own = [odds_of(self._network, x.used, np.zeros_like(sides), seen) for x in state.learnt]
         return by_owner(own, sides)
 
     def _own(self, odds: Odds) -> Odds:

@@ -10,7 +10,7 @@ import torch
 from berteam_cli.selector.updates import Learnt
 from berteam_cli.selector.winners import Examples, Winners
 
-KINDS = ("weights", "means", "squares")  # of tensors in Learnt
+KINDS = ("weights", "means", "squares", "averages")  # of tensors in Learnt
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ def restored(tensors: dict[str, Any], device: str) -> BerteamState:
     learnt: list[Learnt] = []
     rings: list[Winners] = []
     while part := below(tensors, f"learnt.{len(learnt)}."):
-        kinds = ({name: x.to(device) for name, x in below(part, f"{kind}.").items()} for kind in KINDS)
-        learnt.append(Learnt(*kinds, steps=int(part["steps"])))
+        kinds = {kind: {name: x.to(device) for name, x in below(part, f"{kind}.").items()} for kind in KINDS}
+        learnt.append(Learnt(**kinds, steps=int(part["steps"])))
     while part := below(tensors, f"winners.{len(rings)}."):
         held = Examples(*(part[x.name].cpu().numpy() for x in fields(Examples)))
         rings.append(Winners(held, int(part["pushed"])))

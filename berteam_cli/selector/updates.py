@@ -24,12 +24,19 @@ class Learnt:
         means: Adam's running mean of the gradient of each.
         squares: Adam's running mean of its square.
         steps: Adam's steps so far.
+        averages: running means of the parameters; empty where none are kept.
     """
 
     weights: dict[str, Tensor]
     means: dict[str, Tensor]
     squares: dict[str, Tensor]
     steps: int
+    averages: dict[str, Tensor]
+
+    @property
+    def used(self) -> dict[str, Tensor]:
+        """What teams are chosen with: the averages, or the newest parameters where none are kept."""
+        return self.averages or self.weights
 
 
 def untrained(network: TeamNetwork, device: torch.device) -> Learnt:
@@ -37,7 +44,7 @@ def untrained(network: TeamNetwork, device: torch.device) -> Learnt:
     weights = {name: value.detach().to(device, copy=True) for name, value in network.named_parameters()}
     means = {name: torch.zeros_like(value) for name, value in weights.items()}
     squares = {name: torch.zeros_like(value) for name, value in weights.items()}
-    return Learnt(weights, means, squares, 0)
+    return Learnt(weights, means, squares, 0, {})
 
 
 Loss = Callable[[Callable[..., Tensor], Examples, Generator], Tensor]
@@ -52,6 +59,7 @@ def updated(
     rng: Generator,
     *,
     learning_rate: float,
+    averaging: float,
 ) -> tuple[Learnt, float]:
     """Returns what is learnt after one Adam step on each minibatch, and the mean loss.
 
@@ -62,6 +70,7 @@ def updated(
         loss_of: what to go down.
         rng: the only source of chance.
         learning_rate: Adam's; its other settings are torch's defaults.
+        averaging: in [0, 1), what a step counts in the averages where the next counts 1; 0 keeps none.
     """
     weights = {name: value.clone().requires_grad_() for name, value in learnt.weights.items()}
     device = next(iter(weights.values())).device
@@ -77,7 +86,8 @@ def updated(
         on_device = (None if x is None else torch.from_numpy(x).to(device) for x in inputs)
         return functional_call(network, weights, tuple(on_device))
 
-    losses = []
+    averages = {name: value.clone() for name, value in learnt.used.items()} if averaging else {}
+    losses: list[float] = []
     network.train()
     with seeded(rng, device):
         for examples in minibatches:
@@ -85,11 +95,13 @@ def updated(
             whole = len(examples)
             losses.append(sum(add_gradients(loss_of(asked, x, rng), len(x) / whole) for x in parts(network, examples)))
             adam.step()
+            average(averages, weights, averaging, learnt.steps + len(losses))
     after = Learnt(
         {name: weight.detach() for name, weight in weights.items()},
         {name: adam.state[weight]["exp_avg"] for name, weight in weights.items()},
         {name: adam.state[weight]["exp_avg_sq"] for name, weight in weights.items()},
         learnt.steps + len(losses),
+        averages,
     )
     return after, float(np.mean(losses))
 

@@ -8,7 +8,7 @@ from berteam_cli.selector.winners import no_winners, pushed
 
 torch.set_num_threads(1)
 CPU = torch.device("cpu")
-SETTINGS = {"minibatches": 4, "size": 16, "weight_half_life": 0.0, "learning_rate": 1e-3}
+SETTINGS = {"minibatches": 4, "size": 16, "weight_half_life": 0.0, "learning_rate": 1e-3, "averaging": 0.0}
 
 
 def made():
@@ -66,6 +66,30 @@ def test_adam_goes_on_where_it_stopped():
         torch.testing.assert_close(two.squares[name], square, rtol=1e-3, atol=1e-8)
         step = 1e-3 * (mean / (1 - 0.9**5)) / ((two.squares[name] / (1 - 0.999**5)).sqrt() + 1e-8)
         torch.testing.assert_close(two.weights[name], one.weights[name] - step, rtol=1e-4, atol=1e-6)
+
+
+def test_averages_count_each_step_so_much_of_the_next():
+    network, start = made()
+    assert start.used is start.weights
+    one_step = SETTINGS | {"minibatches": 1, "averaging": 0.5}
+    rng, learnt, newest = np.random.default_rng(0), start, []
+    for _ in range(3):
+        learnt, _ = updated(network, learnt, winners_of([[0, 1], [2, 3]]), rng, **one_step)
+        newest.append(learnt.weights)
+    assert learnt.used is learnt.averages
+    for name, average in learnt.averages.items():
+        expected = (newest[0][name] + 2 * newest[1][name] + 4 * newest[2][name]) / 7
+        torch.testing.assert_close(average, expected, rtol=1e-5, atol=1e-7)
+
+
+def test_averaging_changes_nothing_that_is_trained():
+    network, start = made()
+    winners = winners_of([[0, 1], [2, 3]])
+    plain, _ = updated(network, start, winners, np.random.default_rng(0), **SETTINGS)
+    averaged, _ = updated(network, start, winners, np.random.default_rng(0), **SETTINGS | {"averaging": 0.9})
+    assert equal(plain, averaged)
+    assert plain.averages == {}
+    assert plain.used is plain.weights
 
 
 def test_chance_comes_from_the_generator_alone():
