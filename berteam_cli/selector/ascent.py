@@ -22,6 +22,7 @@ def climbed(teams: Ints, value: Callable[[Ints], Floats], allowed: Bools) -> Int
         value: returns (K,) of (K, T) teams.
         allowed: (T, N) who may stand at each place.
     """
+    teams = teams[distinct(teams)]
     best = value(teams)
     for _ in range(SWEEPS):
         before = teams.copy()
@@ -37,5 +38,11 @@ def climbed(teams: Ints, value: Callable[[Ints], Floats], allowed: Bools) -> Int
             best = np.where(better, found, best)
         if (teams == before).all():
             break
-    _, first = np.unique(np.sort(teams, axis=1), axis=0, return_index=True)
-    return teams[first]
+        kept = distinct(teams)  # climbs that met go on as one
+        teams, best = teams[kept], best[kept]
+    return teams
+
+
+def distinct(teams: Ints) -> Ints:
+    """Returns the first row of each of the different ``teams``, (J, T), in lexicographic order of their members."""
+    return np.unique(np.sort(teams, axis=1), axis=0, return_index=True)[1]

@@ -20,15 +20,15 @@ from torch import Tensor
 from berteam_cli.outcomes import OPEN, Experience, Floats, Ints, Lineups, Outcomes
 from berteam_cli.rating.elo import softmax
 from berteam_cli.selector.ascent import climbed
-from berteam_cli.selector.base import Field, Selecting
+from berteam_cli.selector.base import Selecting
 from berteam_cli.selector.berteam_state import KINDS, below
-from berteam_cli.selector.listed import Listed, Mixture, every_team, fresh
+from berteam_cli.selector.listed import Listed, Mixture, every_team, fresh, new_among
 from berteam_cli.selector.network import seeded
 from berteam_cli.selector.outcome_network import OutcomeNetwork, foretold
 from berteam_cli.selector.updates import Learnt, untrained, updated
 
 CPU = torch.device("cpu")
-STARTS = 8  # random teams that a search climbs from, beside the best known ones
+STARTS = 4  # random teams that a search climbs from, beside as many of those that played
 
 
 class Games(NamedTuple):
@@ -138,7 +138,7 @@ class Assessor(Listed):
 
     def foretold(self, state: AssessorState, teams: Ints, against: Ints) -> Floats:
         """Returns (K,) the expected score of ``teams``, (K, T), on average over ``against``, (C, S - 1, T)."""
-        return foretold(self._loaded(state), teams, against)
+        return foretold(self._loaded(state), teams, against, np.ones(len(against), dtype=np.int64))
 
     def tensors(self, state: AssessorState) -> dict[str, Any]:
         """Returns all that ``state`` holds as named tensors, without copies."""
@@ -194,31 +194,35 @@ class Assessor(Listed):
 
     def _searched(self, state: AssessorState, rng: Generator) -> Mixture:
         """Returns the softmax over all teams, or over those that climbing finds where they are too many."""
-        network, against = self._loaded(state), latest_rivals(state, self.window)
+        network, (against, often) = self._loaded(state), latest_rivals(state, self.window)
 
         def value(teams: Ints) -> Floats:
-            return foretold(network, teams, against)
+            return foretold(network, teams, against, often)
 
         teams = every_team(self.field, self.field.exact_limit)
         if teams is None:
-            teams = climbed(starts(self.field, state.will, rng), value, self.field.allowed)
+            known = played_teams(state)
+            best = known[np.argsort(-value(known), kind="stable")[:STARTS]]
+            begun = np.concatenate([best, fresh(self.field, STARTS, best, rng)])
+            teams = climbed(begun, value, self.field.allowed)
         expected = value(teams)
         if self.temperature == 0:
             return Mixture(teams[[expected.argmax()]], np.ones(1))
         return Mixture(teams, softmax(expected / self.temperature))
 
 
-def latest_rivals(state: AssessorState, window: int) -> Ints:
-    """Returns (C, S - 1, T) the other sides of each side of the latest ``window`` games of the ring."""
+def latest_rivals(state: AssessorState, window: int) -> tuple[Ints, Ints]:
+    """Returns (C, S - 1, T) whom a side met in the latest ``window`` games of the ring, and (C,) how often."""
     latest = (state.pushed - 1 - np.arange(min(window, state.held))) % len(state.ring.teams)
-    teams = state.ring.teams[latest]
-    return np.concatenate([np.delete(teams, side, axis=1) for side in range(teams.shape[1])])
+    teams = np.sort(state.ring.teams[latest], axis=2)
+    rivals = np.concatenate([np.delete(teams, side, axis=1) for side in range(teams.shape[1])])
+    return np.unique(rivals, axis=0, return_counts=True)
 
 
-def starts(field: Field, will: Mixture, rng: Generator) -> Ints:
-    """Returns (J, T) the likeliest teams of ``will`` and random ones."""
-    best = will.teams[np.argsort(-will.probability, kind="stable")[:STARTS]]
-    return np.concatenate([best, fresh(field, STARTS, best, rng)])
+def played_teams(state: AssessorState) -> Ints:
+    """Returns (K, T) the different teams of the remembered games, each in an order in which it played."""
+    teams = state.ring.teams[: state.held].reshape(-1, state.ring.teams.shape[2])
+    return new_among(teams, len(teams), teams[:0])
 
 
 def outcome_loss(network: Callable[..., Tensor], games: Games, rng: Generator) -> Tensor:

@@ -21,7 +21,7 @@ from berteam_cli.selector.base import (
     team_count,
     unordered_teams,
 )
-from berteam_cli.selector.filling import drawn, within
+from berteam_cli.selector.filling import within
 
 ORDERS_EACH = 20  # where places differ, ordered teams are listed up to so many for each team that may be listed
 TRIES = 20  # teams drawn for each one that is to be new
@@ -64,9 +64,8 @@ class Listed(Plain):
         """Returns (count, T) teams."""
         will = self.mixture(state)
         if will is None:
-            return independent.sampled(anybody(self.field), count, rng)
-        chosen = drawn(np.broadcast_to(will.probability, (count, len(will.probability))), rng)
-        return ordered(will.teams[chosen], self.field, rng)
+            return random_teams(self.field, count, rng)
+        return ordered(will.teams[picked(will.probability, count, rng)], self.field, rng)
 
     def distribution(self, state: Any) -> TeamDistribution:
         """Returns the chance of each unordered team."""
@@ -94,12 +93,10 @@ class Listed(Plain):
 
     def drawn_games(self, state: Any, games: int, rng: Generator) -> Lineups:
         """Returns ``games`` training games between teams of its own will, and random ones."""
-        will = self.mixture(state)
-        sides = self.field.sides
+        will, teams = self.mixture(state), games * self.field.sides
         if will is None:
-            return lineups(self.field, self.sample(state, games * sides, rng), None, 0.0, rng)
-        chances = np.broadcast_to(will.probability, (games * sides, len(will.probability)))
-        return lineups(self.field, will.teams[drawn(chances, rng)], will, self.explore, rng)
+            return lineups(self.field, random_teams(self.field, teams, rng), None, 0.0, rng)
+        return lineups(self.field, will.teams[picked(will.probability, teams, rng)], will, self.explore, rng)
 
     def scheduled_games(self, teams: Ints, schedule: Ints, rng: Generator) -> Lineups:
         """Returns the training games of a ``schedule``, in random order and sides, with random teams among them.
@@ -121,6 +118,21 @@ def anybody(field: Field) -> Floats:
     return within(np.full((field.team_size, field.members), 1 / field.members), field.allowed)
 
 
+def random_teams(field: Field, count: int, rng: Generator) -> Ints:
+    """Returns (count, T) teams, every place given to all who may stand there alike."""
+    teams = np.empty((count, field.team_size), dtype=np.int64)
+    for place, row in enumerate(field.allowed):
+        options = np.flatnonzero(row)
+        teams[:, place] = options[rng.integers(len(options), size=count)]
+    return teams
+
+
+def picked(chances: Floats, count: int, rng: Generator) -> Ints:
+    """Returns (count,) indices of ``chances``, (K,), drawn in proportion to them."""
+    reached = np.cumsum(chances)
+    return np.searchsorted(reached / reached[-1], rng.random(count), side="right")
+
+
 def lineups(field: Field, chosen: Ints, will: Mixture | None, explore: float, rng: Generator) -> Lineups:
     """Returns the games between ``chosen`` teams, (B S, T), of which some give way to random ones.
 
@@ -134,9 +146,8 @@ def lineups(field: Field, chosen: Ints, will: Mixture | None, explore: float, rn
         rng: the only source of chance.
     """
     rows = np.arange(len(chosen))
-    chances = anybody(field)
-    random = rng.random(len(chosen)) < explore
-    teams = np.where(random[:, np.newaxis], independent.sampled(chances, len(chosen), rng), ordered(chosen, field, rng))
+    random = rng.random((len(chosen), 1)) < explore
+    teams = np.where(random, random_teams(field, len(chosen), rng), ordered(chosen, field, rng))
     captains = teams[rows, rng.integers(field.team_size, size=len(teams))]
     told = log_chances(field, teams, will, explore)
     shape = -1, field.sides
@@ -196,7 +207,7 @@ def fresh(field: Field, count: int, taken: Ints, rng: Generator) -> Ints:
 
     Fewer where many tries find no more.
     """
-    return new_among(independent.sampled(anybody(field), TRIES * count, rng), count, taken)
+    return new_among(random_teams(field, TRIES * count, rng), count, taken)
 
 
 def new_among(teams: Ints, count: int, taken: Ints) -> Ints:

@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from berteam_cli.outcomes import Floats, Ints
 
-NUMBERS = 2**22  # of the hidden layer at once; bounds the memory of large requests
+NUMBERS = 2**17  # of the hidden layer at once; bounds the memory of large requests
 
 
 class OutcomeNetwork(nn.Module):
@@ -47,16 +47,18 @@ class OutcomeNetwork(nn.Module):
         return self.head(torch.relu(ours + others)).squeeze(-1)
 
 
-def foretold(network: OutcomeNetwork, teams: Ints, against: Ints) -> Floats:
+def foretold(network: OutcomeNetwork, teams: Ints, against: Ints, often: Ints) -> Floats:
     """Returns (K,) the score that each of ``teams`` is expected to have, on average over whom it plays.
 
     Args:
         network: with its weights.
         teams: (K, T).
         against: (C, S - 1, T) the other sides of C games.
+        often: (C,) how often each of these games counts.
     """
     games, rivals = against.shape[:2]
     scores = np.empty(len(teams))
+    weights = torch.from_numpy(often / often.sum())
     with torch.inference_mode():
         theirs = network.encoded(torch.from_numpy(against))  # (C, S - 1, W)
         seen = network.theirs(theirs)
@@ -68,5 +70,5 @@ def foretold(network: OutcomeNetwork, teams: Ints, against: Ints) -> Floats:
             met = (network.theirs(code)[:, None, None] + total[None, :, None] - seen[None]) / rivals
             other = network.logits(network.ours(theirs)[None], met)  # (R, C, S - 1)
             shares = torch.softmax(torch.cat([own[:, :, None], other], dim=2).double(), dim=2)
-            scores[first : first + rows] = shares[:, :, 0].mean(dim=1).numpy()
+            scores[first : first + rows] = (shares[:, :, 0] @ weights).numpy()
     return scores

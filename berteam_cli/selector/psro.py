@@ -16,8 +16,7 @@ from numpy.random import Generator
 
 from berteam_cli.outcomes import Experience, Floats, Ints, Lineups, Outcomes
 from berteam_cli.selector.base import Selecting
-from berteam_cli.selector.filling import drawn
-from berteam_cli.selector.listed import Listed, Mixture, anybody, fresh, new_among, places_of
+from berteam_cli.selector.listed import Listed, Mixture, fresh, new_among, picked, places_of, random_teams
 from berteam_cli.selector.metastrategies import nash, projected_replicator
 
 SOLVERS = ("uniform", "nash", "replicator")
@@ -111,8 +110,7 @@ class Psro(Listed):
         elif size == 1:  # nobody to meet
             tried = games
         met = least_met(state.games[:size, :size], games - tried, self.field.sides, rng)
-        chances = np.broadcast_to(state.strategy, (tried * (self.field.sides - 1), size))
-        against = drawn(chances, rng).reshape(tried, self.field.sides - 1)
+        against = picked(state.strategy, tried * (self.field.sides - 1), rng).reshape(tried, self.field.sides - 1)
         candidates = size + least_tried(state.trials, tried, rng)
         schedule = np.concatenate([met, np.column_stack([candidates, against])])
         return self.scheduled_games(state.teams, schedule, rng)
@@ -182,7 +180,7 @@ class Psro(Listed):
     def _tried(self, found: Ints, strategy: Floats, rng: Generator) -> Ints:
         """Returns (C, T) new candidates; fewer where there are hardly any other teams."""
         near = self.candidates // 2
-        likely = found[drawn(np.broadcast_to(strategy, (4 * near, len(strategy))), rng)]
+        likely = found[picked(strategy, 4 * near, rng)]
         changed = new_among(self._changed(likely, rng), near, found)
         others = fresh(self.field, self.candidates - len(changed), np.concatenate([found, changed]), rng)
         return np.concatenate([changed, others])
@@ -190,9 +188,9 @@ class Psro(Listed):
     def _changed(self, teams: Ints, rng: Generator) -> Ints:
         """Returns ``teams``, (J, T), each with somebody drawn anew for one place."""
         rows, place = np.arange(len(teams)), rng.integers(self.field.team_size, size=len(teams))
-        teams = teams.copy()
-        teams[rows, place] = drawn(anybody(self.field)[place], rng)
-        return teams
+        changed = teams.copy()
+        changed[rows, place] = random_teams(self.field, len(teams), rng)[rows, place]
+        return changed
 
 
 def counted(gains: Floats, games: Floats, teams: Ints, outcomes: Outcomes) -> tuple[Floats, Floats]:

@@ -24,17 +24,18 @@ def test_the_order_of_members_does_not_matter_and_sides_are_alike(network):
 def test_foretold_scores_are_the_mean_of_the_shares(network, rivals, monkeypatch):
     rng = np.random.default_rng(0)
     teams, against = rng.integers(6, size=(5, 3)), rng.integers(6, size=(4, rivals, 3))
+    often = np.array([1, 3, 1, 2])
     expected = [
         np.mean(
             [
                 torch.softmax(network(torch.from_numpy(np.concatenate([team[np.newaxis], x])[np.newaxis])), 1)[
                     0, 0
                 ].item()
-                for x in against
+                for x in against.repeat(often, axis=0)
             ]
         )
         for team in teams
     ]
-    np.testing.assert_allclose(foretold(network, teams, against), expected, atol=1e-6)
+    np.testing.assert_allclose(foretold(network, teams, against, often), expected, atol=1e-6)
     monkeypatch.setattr(outcome_network, "NUMBERS", 1)  # one team at a time
-    np.testing.assert_allclose(foretold(network, teams, against), expected, atol=1e-6)
+    np.testing.assert_allclose(foretold(network, teams, against, often), expected, atol=1e-6)
