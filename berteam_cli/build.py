@@ -26,17 +26,29 @@ from berteam_cli.optimizer.fitness import CaptainElo, FitnessRule, MovingAverage
 from berteam_cli.optimizer.fixed import Fixed
 from berteam_cli.optimizer.mapelites import MapElites
 from berteam_cli.population import Island, island_of
+from berteam_cli.selector.assessor import Assessor
 from berteam_cli.selector.base import Field, Selector
 from berteam_cli.selector.berteam import Berteam
+from berteam_cli.selector.best_members import BestMembers
+from berteam_cli.selector.best_team import BestTeam
 from berteam_cli.selector.constraints import allowed
 from berteam_cli.selector.mcaa import Mcaa
 from berteam_cli.selector.observations import looking
+from berteam_cli.selector.psro import Psro
 from berteam_cli.selector.uniform import Uniform
 from berteam_cli.training import Parts, rounds
 from berteam_cli.workers import Workers, available_cores
 
 ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps, "pettingzoo": Pettingzoo}
-SELECTORS: dict[str, Callable[..., Selector[Any]]] = {"uniform": Uniform, "mcaa": Mcaa, "berteam": Berteam}
+SELECTORS: dict[str, Callable[..., Selector[Any]]] = {
+    "uniform": Uniform,
+    "mcaa": Mcaa,
+    "berteam": Berteam,
+    "best_members": BestMembers,
+    "best_team": BestTeam,
+    "assessor": Assessor,
+    "psro": Psro,
+}
 
 
 def games(config: CommandConfig) -> Games:

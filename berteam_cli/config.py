@@ -150,6 +150,55 @@ class McaaConfig(SelectorConfig):
 
     learning_rate: float = number(open_low=True)
     train_every: int = number(1)
+    top_fraction: float | None = number(0, 1, open_low=True)
+
+
+@dataclass
+class ListedConfig(SelectorConfig):
+    """Settings of selector/listed.py, for selectors that choose from a list of teams."""
+
+    explore: float = number(0, 1)
+
+
+@dataclass
+class BestMembersConfig(ListedConfig):
+    """Settings of selector/best_members.py."""
+
+
+@dataclass
+class BestTeamConfig(ListedConfig):
+    """Settings of selector/best_team.py."""
+
+    candidates: int = number(1)
+    games_per_rung: int = number(1)
+    restart: bool = MISSING
+
+
+@dataclass
+class AssessorConfig(ListedConfig):
+    """Settings of selector/assessor.py."""
+
+    capacity: int = number(1)
+    window: int = number(1)
+    train_every: int = number(1)
+    batch_size: int = number(1)
+    minibatch_size: int = number(1)
+    width: int = number(1, 8192)
+    learning_rate: float = number(open_low=True)
+    temperature: float = number()
+
+
+@dataclass
+class PsroConfig(ListedConfig):
+    """Settings of selector/psro.py."""
+
+    start: int = number(1)
+    solver: str = choice("uniform", "nash", "replicator")
+    gamma: float = number(0, 1)
+    expand_every: int = number(1)
+    candidates: int = number(1)
+    capacity: int = number(1)
+    half_life: float = number()
 
 
 @dataclass
@@ -391,7 +440,15 @@ class ReplayConfig:
 
 SCHEMAS: dict[str, dict[str, type]] = {
     "env": {"mctf": MctfConfig, "rps": RpsConfig, "pettingzoo": PettingzooConfig},
-    "selector": {"uniform": UniformConfig, "mcaa": McaaConfig, "berteam": BerteamConfig},
+    "selector": {
+        "uniform": UniformConfig,
+        "mcaa": McaaConfig,
+        "berteam": BerteamConfig,
+        "best_members": BestMembersConfig,
+        "best_team": BestTeamConfig,
+        "assessor": AssessorConfig,
+        "psro": PsroConfig,
+    },
     "optimizer": {"fixed": FixedOptimizerConfig, "coevolution": CoevolutionConfig, "mapelites": MapElitesConfig},
     "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig, "sb3": Sb3Config},
     "population": {"islands": PopulationConfig},

@@ -5,7 +5,7 @@ Every place of a team is drawn by itself: an island from the softmax of the logi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from berteam_cli.rating.elo import softmax
 from berteam_cli.selector import independent
 from berteam_cli.selector.base import Field, Plain, Selecting, TeamDistribution, exactly
 from berteam_cli.selector.filling import within
+from berteam_cli.selector.tally import Tally, no_games
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,13 @@ class McaaState:
         logits: (I,) of the islands.
         wins: (I,) members of each island in the teams that won since the last update.
         epochs: learnt from so far.
+        tally: of the teams that played since the last update; None where only wins count.
     """
 
     logits: Floats
     wins: Ints
     epochs: int
+    tally: Tally | None = None
 
     @property
     def shares(self) -> Floats:
@@ -41,22 +44,25 @@ class McaaState:
 
 @dataclass(frozen=True, eq=False)
 class Mcaa(Plain):
-    """Moves the islands' shares towards those among the winners.
+    """Moves the islands' shares towards those among the teams that count.
 
     Attributes:
         field: among whom it chooses.
         learning_rate: eta, the step on the logits.
         train_every: epochs between two steps.
+        top_fraction: share of the teams, by mean score, whose members are counted; None: those of winners are, once for
+            each win (the paper's adaptation).
     """
 
     field: Field
     learning_rate: float
     train_every: int
+    top_fraction: float | None = None
 
     def init(self, rng: Generator) -> McaaState:
         """Returns equal shares."""
         islands = int(self.field.island_of.max()) + 1
-        return McaaState(np.zeros(islands), np.zeros(islands, dtype=np.int64), 0)
+        return McaaState(np.zeros(islands), np.zeros(islands, dtype=np.int64), 0, self._nobody())
 
     def select(self, state: McaaState, games: int, ages: Ints, rng: Generator) -> Lineups:
         """Returns the teams of ``games`` games; MCAA knows neither captains nor noise for new members."""
@@ -84,36 +90,74 @@ class Mcaa(Plain):
     def learn(
         self, state: McaaState, outcomes: Outcomes, seen: Experience, fitness: Floats, rng: Generator
     ) -> tuple[McaaState, Selecting]:
-        """Returns the state after counting the winners and, every ``train_every`` epochs, one gradient step.
+        """Returns the state after counting the games and, every ``train_every`` epochs, one gradient step.
 
-        The step goes down half the squared distance between the winners' island shares q and the own shares s:
-        logits += eta J (q - s), with J = diag(s) - s s^T the Jacobian of the softmax.
+        The step goes down half the squared distance between the island shares q of the teams that count and the own
+        shares s: logits += eta J (q - s), with J = diag(s) - s s^T the Jacobian of the softmax.
         """
-        islands = self.field.island_of[outcomes.winners.ravel()]
-        wins = state.wins + np.bincount(islands, minlength=len(state.logits))
-        state = replace(state, wins=wins, epochs=state.epochs + 1)
-        if state.epochs % self.train_every or not wins.any():
-            return state, Selecting(buffer=int(wins.sum()) // self.field.team_size)
+        state = replace(self._counted(state, outcomes), epochs=state.epochs + 1)
+        members = state.wins if state.tally is None else self._of_the_best(state.tally, len(state.logits))
+        if state.epochs % self.train_every or not members.any():
+            teams = len(state.tally) if state.tally is not None else int(state.wins.sum()) // self.field.team_size
+            return state, Selecting(buffer=teams)
         shares = state.shares
-        error = wins / wins.sum() - shares
+        error = members / members.sum() - shares
         step = shares * (error - shares @ error)
-        learnt = replace(state, logits=state.logits + self.learning_rate * step, wins=np.zeros_like(wins))
+        logits = state.logits + self.learning_rate * step
+        learnt = replace(state, logits=logits, wins=np.zeros_like(state.wins), tally=self._nobody())
         return learnt, Selecting(updates=1, loss=float(error @ error / 2))
 
     def tensors(self, state: McaaState) -> dict[str, Any]:
         """Returns ``state`` as tensors."""
-        return {
+        named = {
             "logits": torch.from_numpy(state.logits),
             "wins": torch.from_numpy(state.wins),
             "epochs": torch.tensor(state.epochs),
         }
+        if state.tally is not None:
+            named |= {x.name: torch.from_numpy(getattr(state.tally, x.name)) for x in fields(Tally)}
+        return named
 
     def restored(self, tensors: dict[str, Any]) -> McaaState:
         """Returns the state that gave ``tensors``."""
-        return McaaState(tensors["logits"].numpy(), tensors["wins"].numpy(), int(tensors["epochs"]))
+        tally = None
+        if self.top_fraction is not None:
+            tally = Tally(*(tensors[x.name].numpy() for x in fields(Tally)))
+        return McaaState(tensors["logits"].numpy(), tensors["wins"].numpy(), int(tensors["epochs"]), tally)
+
+    def _nobody(self) -> Tally | None:
+        """Returns the tally of no team, where teams are ranked."""
+        return None if self.top_fraction is None else no_games(np.zeros((0, self.field.team_size), dtype=np.int64))
+
+    def _counted(self, state: McaaState, outcomes: Outcomes) -> McaaState:
+        """Returns ``state`` with the games of one more epoch."""
+        if state.tally is not None:
+            return replace(state, tally=state.tally.after_all(outcomes))
+        islands = self.field.island_of[outcomes.winners.ravel()]
+        return replace(state, wins=state.wins + np.bincount(islands, minlength=len(state.logits)))
+
+    def _of_the_best(self, tally: Tally, islands: int) -> Floats:
+        """Returns (I,) the members of each island in the best of the teams that played."""
+        weights = np.repeat(top_weights(tally.mean, self.top_fraction), self.field.team_size)
+        return np.bincount(self.field.island_of[tally.teams.ravel()], weights=weights, minlength=islands)
 
     def _chances(self, state: McaaState) -> Floats:
         """Returns (T, N) the chance of each member at each place, in proportion to its island's share."""
         sizes = np.bincount(self.field.island_of)
         chances = (state.shares / sizes)[self.field.island_of]
         return within(np.tile(chances / chances.sum(), (self.field.team_size, 1)), self.field.allowed)
+
+
+def top_weights(scores: Floats, fraction: float) -> Floats:
+    """Returns (K,) how much of each team is in the best ``fraction`` of all; the weights sum to fraction K.
+
+    Equally good teams at the cut share what is left for them.
+
+    Args:
+        scores: (K,) of the teams.
+        fraction: in (0, 1].
+    """
+    best_first = -np.round(scores, 12)  # means of equal scores differ in their last digits
+    _, which, counts = np.unique(best_first, return_inverse=True, return_counts=True)
+    ahead = np.cumsum(counts) - counts
+    return np.clip((fraction * len(scores) - ahead) / counts, 0.0, 1.0)[which.reshape(-1)]

@@ -1,18 +1,18 @@
-"""Gradient steps on the team network, from one frozen set of weights to the next."""
+"""Gradient steps on a network, from one frozen set of weights to the next."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.random import Generator
-from torch import Tensor
+from torch import Tensor, nn
 from torch.func import functional_call
 
-from berteam_cli.selector.network import TeamNetwork, seeded
-from berteam_cli.selector.winners import Examples
+from berteam_cli.selector.network import seeded
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Learnt:
         return self.averages or self.weights
 
 
-def untrained(network: TeamNetwork, device: torch.device) -> Learnt:
+def untrained(network: nn.Module, device: torch.device) -> Learnt:
     """Returns the weights of ``network`` on ``device`` before the first step."""
     weights = {name: value.detach().to(device, copy=True) for name, value in network.named_parameters()}
     means = {name: torch.zeros_like(value) for name, value in weights.items()}
@@ -47,14 +47,14 @@ def untrained(network: TeamNetwork, device: torch.device) -> Learnt:
     return Learnt(weights, means, squares, 0, {})
 
 
-Loss = Callable[[Callable[..., Tensor], Examples, Generator], Tensor]
+Loss = Callable[[Callable[..., Tensor], Any, Generator], Tensor]
 """What a gradient step goes down: of the network, from arrays of its inputs to logits, and a minibatch of examples."""
 
 
 def updated(
-    network: TeamNetwork,
+    network: nn.Module,
     learnt: Learnt,
-    minibatches: Iterable[Examples],
+    minibatches: Iterable[Any],
     loss_of: Loss,
     rng: Generator,
     *,

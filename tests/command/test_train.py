@@ -192,7 +192,7 @@ def test_sampled_distribution_says_so(berteam, tmp_path):
 def test_flags_of_hydra(berteam, tmp_path):
     assert "learning_rate" in berteam("train", "selector=mcaa", "--cfg", "job").stdout
     helped = berteam("train", "--help").stdout
-    assert "  selector: berteam, mcaa, uniform\n" in helped
+    assert "  selector: assessor, berteam, best_members, best_team, mcaa, psro, uniform\n" in helped
     assert "schema" not in helped
     assert "berteam train selector=mcaa optimizer=mapelites" in helped
     assert list(tmp_path.iterdir()) == []
