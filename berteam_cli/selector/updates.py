@@ -121,3 +121,15 @@ def add_gradients(loss: Tensor, share: float) -> float:
     part = loss * share
     part.backward()
     return float(part.item())
+
+
+def average(averages: dict[str, Tensor], weights: dict[str, Tensor], averaging: float, step: int) -> None:
+    """Takes ``weights`` after their ``step``-th step into ``averages``, in place; does nothing where none are kept.
+
+    Each step counts a = ``averaging`` times the next, so that the newest has the share (1 - a) / (1 - a^step): all at
+    the first, and the random weights before it never count.
+    """
+    if averages:
+        share = (1 - averaging) / (1 - averaging**step)
+        with torch.no_grad():
+            torch._foreach_lerp_(list(averages.values()), [weights[name] for name in averages], share)
