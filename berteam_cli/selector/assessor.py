@@ -131,6 +131,7 @@ class Assessor(Listed):
             outcome_loss,
             rng,
             learning_rate=self.learning_rate,
+            averaging=0.0,
         )
         after = replace(after, learnt=learnt)
         after = replace(after, will=self._searched(after, rng))
@@ -156,9 +157,9 @@ class Assessor(Listed):
 
     def restored(self, tensors: dict[str, Any]) -> AssessorState:
         """Returns the state that ``tensors`` gave these."""
-        kinds = (below(tensors, f"learnt.{kind}.") for kind in KINDS)
+        kinds = {kind: below(tensors, f"learnt.{kind}.") for kind in KINDS}
         return AssessorState(
-            Learnt(*kinds, steps=int(tensors["learnt.steps"])),
+            Learnt(**kinds, steps=int(tensors["learnt.steps"])),
             Games(tensors["ring.teams"].numpy(), tensors["ring.scores"].numpy()),
             int(tensors["pushed"]),
             Mixture(tensors["will.teams"].numpy(), tensors["will.probability"].numpy()),
@@ -186,11 +187,11 @@ class Assessor(Listed):
         ring.teams[rows], ring.scores[rows] = new
         return replace(state, ring=ring, pushed=pushed)
 
-    def _minibatches(self, state: AssessorState, rng: Generator) -> Iterator[Games]:
-        """Returns the games of an update."""
+    def _minibatches(self, state: AssessorState, rng: Generator) -> Iterator[list[tuple[Games, float]]]:
+        """Yields the minibatches of an update, each drawn anew and whole."""
         for _ in range(self.batch_size // self.minibatch_size):
             rows = rng.integers(state.held, size=self.minibatch_size)
-            yield Games(state.ring.teams[rows], state.ring.scores[rows])
+            yield [(Games(state.ring.teams[rows], state.ring.scores[rows]), 1.0)]
 
     def _searched(self, state: AssessorState, rng: Generator) -> Mixture:
         """Returns the softmax over all teams, or over those that climbing finds where they are too many."""

@@ -205,6 +205,16 @@ def orderings(teams: Ints) -> Floats:
     return math.factorial(size) / counts
 
 
+def log_orderings(teams: Ints) -> Floats:
+    """Returns (K,) ln of ``orderings``, for teams of any size."""
+    size = teams.shape[1]
+    repeats, run = np.zeros(len(teams)), np.ones(len(teams))
+    for place in range(1, size):
+        run = np.where(teams[:, place] == teams[:, place - 1], run + 1, 1)
+        repeats += np.log(run)
+    return math.lgamma(size + 1) - repeats
+
+
 SAMPLES = 20_000  # teams drawn where they are too many to list
 PLACES_ASKED = 200_000  # or fewer, where teams are large: a drawn team costs a network T^2 places
 

@@ -37,7 +37,7 @@ from berteam_cli.selector.masking import masking_loss
 from berteam_cli.selector.network import LONGEST, POSITIONS, TeamNetwork, by_owner, odds_of, seeded
 from berteam_cli.selector.observations import Looking, Seen, nothing_seen, seen_in
 from berteam_cli.selector.updates import untrained, updated
-from berteam_cli.selector.winners import Examples, Winners, harvest, minibatch, no_winners, pushed
+from berteam_cli.selector.winners import Examples, Winners, harvest, in_parts, minibatch, no_winners, pushed
 
 CPU = torch.device("cpu")
 KNOWING = ("shared", "token", "separate")  # how a side that is chosen for is told from the others
@@ -378,12 +378,14 @@ class Berteam:
         """Returns what the members of all teams saw in ``games`` games, (B, S)."""
         return seen_in(experience, games, self.field.sides, self.observations)
 
-    def _minibatches(self, rings: tuple[Winners, ...], rng: Generator) -> Iterator[Examples]:
-        """Yields the minibatches of an update, each drawn anew."""
+    def _minibatches(self, rings: tuple[Winners, ...], rng: Generator) -> Iterator[list[tuple[Examples, float]]]:
+        """Yields the minibatches of an update, each drawn anew, in parts that the memory holds."""
+        rows = rings[0].held.rows
         for _ in range(self.batch_size // self.minibatch_size):
             examples = minibatch(rings, self.minibatch_size, self.weight_half_life, rng)
-            alike = self.side != "token"
-            yield replace(examples, sides=np.zeros_like(examples.sides)) if alike else examples
+            if self.side != "token":
+                examples = replace(examples, sides=np.zeros_like(examples.sides))
+            yield in_parts(examples, self._network.rows(self.field.team_size, *rows.shape[1:3]))
 
     def _open(self, count: int) -> Ints:
         """Returns (count, T) teams that nobody stands in yet."""

@@ -14,10 +14,10 @@ import numpy as np
 import torch
 from numpy.random import Generator
 
+from berteam_cli.evaluation.equilibria import nash, projected_replicator
 from berteam_cli.outcomes import Experience, Floats, Ints, Lineups, Outcomes
 from berteam_cli.selector.base import Selecting
 from berteam_cli.selector.listed import Listed, Mixture, fresh, new_among, picked, places_of, random_teams
-from berteam_cli.selector.metastrategies import nash, projected_replicator
 
 SOLVERS = ("uniform", "nash", "replicator")
 
@@ -148,9 +148,9 @@ class Psro(Listed):
     def _solved(self, payoff: Floats) -> Floats:
         """Returns (K,) the mixture."""
         if self.solver == "nash":
-            return nash(payoff)
+            return nash(payoff).strategy
         if self.solver == "replicator":
-            return projected_replicator(payoff, self.gamma)
+            return projected_replicator(payoff, exploration=self.gamma, step=0.2, steps=500)[0]
         return np.full(len(payoff), 1 / len(payoff))
 
     def _expanded(self, state: PsroState, rng: Generator) -> tuple[PsroState, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,7 +54,7 @@ Loss = Callable[[Callable[..., Tensor], Any, Generator], Tensor]
 def updated(
     network: nn.Module,
     learnt: Learnt,
-    minibatches: Iterable[Any],
+    minibatches: Iterable[Sequence[tuple[Any, float]]],
     loss_of: Loss,
     rng: Generator,
     *,
@@ -66,7 +66,7 @@ def updated(
     Args:
         network: holds the architecture; its own weights do not matter.
         learnt: stays as it is.
-        minibatches: at least one.
+        minibatches: at least one; each in the parts that the memory holds, with their shares of the whole.
         loss_of: what to go down.
         rng: the only source of chance.
         learning_rate: Adam's; its other settings are torch's defaults.
@@ -90,10 +90,9 @@ def updated(
     losses: list[float] = []
     network.train()
     with seeded(rng, device):
-        for examples in minibatches:
+        for parts in minibatches:
             adam.zero_grad()
-            whole = len(examples)
-            losses.append(sum(add_gradients(loss_of(asked, x, rng), len(x) / whole) for x in parts(network, examples)))
+            losses.append(sum(add_gradients(loss_of(asked, part, rng), share) for part, share in parts))
             adam.step()
             average(averages, weights, averaging, learnt.steps + len(losses))
     after = Learnt(
@@ -104,13 +103,6 @@ def updated(
         averages,
     )
     return after, float(np.mean(losses))
-
-
-def parts(network: TeamNetwork, examples: Examples) -> Iterator[Examples]:
-    """Yields a minibatch in parts that the memory holds: long teams go through the network a few at a time."""
-    size = network.rows(examples.teams.shape[1], *examples.rows.shape[1:3])
-    for first in range(0, len(examples), size):
-        yield examples[np.arange(first, min(first + size, len(examples)))]
 
 
 def add_gradients(loss: Tensor, share: float) -> float:

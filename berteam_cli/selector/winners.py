@@ -135,6 +135,13 @@ def minibatch(rings: Sequence[Winners], size: int, half_life: float, rng: Genera
     return replace(examples, weights=weights / weights.mean())
 
 
+def in_parts(examples: Examples, size: int) -> list[tuple[Examples, float]]:
+    """Returns ``examples`` in parts of at most ``size``, each with its share of all."""
+    starts = range(0, len(examples), size)
+    parts = [examples[np.arange(first, min(first + size, len(examples)))] for first in starts]
+    return [(part, len(part) / len(examples)) for part in parts]
+
+
 def harvest(
     outcomes: Outcomes, seen: Seen, chosen: Bools, draw_weight: float, weight_cap: float, log_uniform: float | None
 ) -> Examples:

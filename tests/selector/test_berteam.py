@@ -166,10 +166,10 @@ def test_teams_are_chosen_with_the_averages_where_there_are_any():
     selector = made(averaging=0.9)
     state, rng = selector.init(np.random.default_rng(0)), np.random.default_rng(1)
     for _ in range(5):
-        state, _ = selector.learn(state, same_winner(selector, [3, 1]), rng)
-    learnt = state.learnt
-    as_if = replace(state, learnt=replace(learnt, weights=learnt.averages, averages={}))
-    newest = replace(state, learnt=replace(learnt, averages={}))
+        state, _ = learn(selector, state, same_winner(selector, [3, 1]), rng)
+    (learnt,) = state.learnt
+    as_if = replace(state, learnt=(replace(learnt, weights=learnt.averages, averages={}),))
+    newest = replace(state, learnt=(replace(learnt, averages={}),))
     chosen, expected, other = (selector.distribution(x).probability for x in (state, as_if, newest))
     assert np.array_equal(chosen, expected)
     assert not np.allclose(chosen, other)
@@ -364,7 +364,7 @@ LEARNER = {
 @pytest.mark.parametrize("weighting", [True, False])
 def test_weighting_fits_win_rates_and_no_weighting_the_replicator(weighting):
     selector, wins = made(weighting=weighting, **LEARNER), win_matrix(1)
-    start = begun(selector, seed=1, sharper=5.0)
+    start = begun(selector, seed=1, sharper=2.5)
     before = ordered(selector, start)
     rates = wins @ before  # W(A) = P(A beats B), B drawn from the network
     fit = {True: rates / rates.sum(), False: before * rates / (before @ rates)}

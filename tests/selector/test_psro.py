@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from berteam_cli.evaluation.equilibria import exploitability
 from berteam_cli.selector.base import Field, unordered_teams
 from berteam_cli.selector.listed import places_of
-from berteam_cli.selector.metastrategies import exploitability
 from berteam_cli.selector.psro import Psro, counted, least_met, least_tried
 from tests.selector.matrix_games import by_strength, chance_game, hands, played, trained
 from tests.strategies import outcomes
