@@ -6,6 +6,7 @@ Matrices are (K, K), row against column; strategies are (K,), not negative, with
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog, minimize
@@ -106,16 +107,15 @@ def nash(payoff: Floats) -> Equilibrium:
 def guarantee(payoff: Floats) -> float:
     """Returns the value of the zero-sum game ``payoff`` to its row player."""
     rows, columns = payoff.shape
-    solved = linprog(
+    solved = programme(
         np.append(np.zeros(rows), -1.0),
         A_ub=np.hstack([-payoff.T, np.ones((columns, 1))]),
         b_ub=np.zeros(columns),
         A_eq=np.append(np.ones(rows), 0.0)[np.newaxis],
         b_eq=[1.0],
         bounds=[(0, None)] * rows + [(None, None)],
-        options=PRECISE,
     )
-    return float(solved.x[-1])
+    return float(solved[-1])
 
 
 def relative_interior(margins: Floats) -> tuple[Floats, Bools]:
@@ -132,15 +132,29 @@ def relative_interior(margins: Floats) -> tuple[Floats, Bools]:
     """
     columns, rows = margins.shape
     capped = rows + columns  # unknowns: t of each row and each column in [0, 1], then x, with x >= t and margin >= t
-    solved = linprog(
+    solved = programme(
         np.concatenate([-np.ones(capped), np.zeros(rows)]),
         A_ub=np.hstack([np.eye(capped), -np.vstack([np.eye(rows), margins])]),
         b_ub=np.append(np.zeros(rows), np.full(columns, LOOSE)),
         bounds=[(0, 1)] * capped + [(0, None)] * rows,
-        options=PRECISE,
     )
-    playing = np.where(solved.x[:rows] > 0.5, solved.x[capped:], 0.0)
-    return playing / playing.sum(), solved.x[rows:capped] < 0.5
+    playing = np.where(solved[:rows] > 0.5, solved[capped:], 0.0)
+    return playing / playing.sum(), solved[rows:capped] < 0.5
+
+
+def programme(objective: Floats, **constraints: Any) -> Floats:
+    """Returns what is least by ``objective`` within ``constraints`` of scipy's linprog.
+
+    Where HiGHS does not reach the precision that tells tight constraints from loose ones, its own has to do.
+
+    Raises:
+        ArithmeticError: there is no such thing.
+    """
+    for options in (PRECISE, {}):
+        solved = linprog(objective, options=options, **constraints)
+        if solved.success:
+            return np.asarray(solved.x)
+    raise ArithmeticError(f"no solution of a matrix game was found: {solved.message}")
 
 
 def highest_entropy(margins: Floats, equal: Bools) -> Floats:

@@ -32,7 +32,7 @@ def test_a_resumed_run_has_the_bytes_of_an_unbroken_one(berteam, tmp_path):
     assert set(teams.team) == {"0-0", "0-1", "0-2", "1-1", "1-2"}  # nobody but 0 or 1 at the first place
     merged = last.groupby("team").probability.mean()
     now = teams[teams.epoch == 6].set_index("team").probability
-    assert (merged - now).abs().max() < 1e-9
+    assert (merged - now).abs().max() < 1e-6  # float32 logits, in batches of another size
     games = pd.read_csv(tmp_path / "whole" / "games.csv", dtype={"blue": str, "red": str})
     for _, epoch in games.groupby("epoch"):
         first, second = epoch.iloc[:3].reset_index(), epoch.iloc[3:].reset_index()

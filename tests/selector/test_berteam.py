@@ -363,8 +363,8 @@ LEARNER = {
 
 @pytest.mark.parametrize("weighting", [True, False])
 def test_weighting_fits_win_rates_and_no_weighting_the_replicator(weighting):
-    selector, wins = made(weighting=weighting, **LEARNER), win_matrix(1)
-    start = begun(selector, seed=1, sharper=2.5)
+    selector, wins = made(weighting=weighting, **LEARNER | {"averaging": 0.9}), win_matrix(1)
+    start = begun(selector, seed=1, sharper=1.5)
     before = ordered(selector, start)
     rates = wins @ before  # W(A) = P(A beats B), B drawn from the network
     fit = {True: rates / rates.sum(), False: before * rates / (before @ rates)}
