@@ -86,6 +86,6 @@ def test_an_epoch_depends_on_nothing_but_the_run(runs, parts):
 
 def test_restored_tensors_begin_where_new_ones_would(runs, parts, tmp_path):
     """By where a tensor lies torch chooses its kernels, and so the last bits: within a file they lie anywhere."""
-    learnt = checkpoint.load(tmp_path, parts).run.selection.learnt
+    (learnt,) = checkpoint.load(tmp_path, parts).run.selection.learnt
     for kind in (learnt.weights, learnt.means, learnt.squares):
         assert {tensor.data_ptr() % 64 for tensor in kind.values()} == {0}
