@@ -2,18 +2,18 @@
 
 The distance of the distribution D over teams from the one that is always T is |D - e_T|_1 = 2 - 2 D_T. Weighted by
 outcome o and inverse chance c over the teams that played, its mean is least where D is all on the teams with the best
-expected outcome. Two things are added that leave that least point where it is:
+expected outcome. Two things keep that least point where it is and make it easier to reach:
 
 - The scale. D_T is a product of many chances: far from the answer it is about 1 / N^T, and so is its slope, and there
-  training is said to get stuck. The mean of c D is an estimate of a constant, since D sums to 1 over all teams and by c
-  all teams are equally common; dividing by it makes the loss 2 - 2 V, where V is the outcome that D itself expects. Its
-  slope does not vanish: every team pushes by D_T / P_T, how much more common it is now than when it was chosen.
-- The baseline. For the same reason the mean of c D times a constant has no slope in expectation. With V in that place
-  only outcomes better or worse than what D expects anyway push, which leaves less to chance; and a team so rare that
-  its weight is capped is seldom seen, but not for that taken to be bad. This is why losers have to be kept too.
+  training is said to get stuck. The mean of c D estimates a constant, since by c all teams are equally common and D
+  sums to 1 over them; divided by it, the loss is 2 - 2 V, V the outcome that D itself expects: the mean of o with
+  shares c D / sum(c D), each team as much more common as it is now than when it was chosen.
+- The baseline. As the shares sum to 1, the slope of V is that of the mean of c D (o - V): only outcomes that are better
+  or worse than what D expects anyway push, which leaves less to chance. A team so rare that its weight is capped is
+  underrated in how common it is, not in how good. This is why losers teach too.
 
-Then there is no more of D in the loss than its entropy: below that of a D that leaves a share p to all but one team it
-is pushed up, so that no team falls out of sight; above, it is not.
+The entropy of D, with the same shares, is pushed up while it is below that of a D that leaves a share p to all teams
+but one, so that no team falls out of sight.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import torch
 from numpy.random import Generator
 from torch import Tensor
 
-from berteam_cli.outcomes import OPEN, Bools, Ints
+from berteam_cli.outcomes import ABSENT, OPEN, Bools, Ints
 from berteam_cli.selector.masking import forgotten
 from berteam_cli.selector.winners import Examples
 
@@ -40,10 +40,11 @@ def best_response_loss(
     drop_player: float,
     rng: Generator,
 ) -> Tensor:
-    """Returns 2 - 2 V - beta mean(min(H, gamma)) / gamma, of which V has the slope of mean(c D (o - V)) / mean(c D).
+    """Returns 2 - 2 V - beta H / gamma, with V the mean outcome that the network's distribution D over teams expects.
 
-    V = mean(c D o) / mean(c D). The chance D of each team is estimated by the product of the conditionals along one
-    random fill order; H is the sum of their entropies, in nats.
+    V and H are means of the outcomes and of the entropies min(H_T, gamma), in nats, with shares c D / sum(c D). The
+    chance D of each team is estimated by the product of the conditionals along one random fill order; H_T is the sum of
+    the entropies of these conditionals.
 
     Args:
         network: from its inputs to logits.
@@ -68,42 +69,34 @@ def best_response_loss(
     place = order.T  # (T, K) the place filled at each step
     there = torch.from_numpy(allowed[place]).to(device)
     log_odds = torch.log_softmax(logits[steps, rows, place].masked_fill(~there, -torch.inf), dim=-1)  # (T, K, N)
-    log_chance = log_odds[steps, rows, examples.teams[rows, place]].sum(dim=0)  # (K,)
-    entropy = -(log_odds.exp() * log_odds.masked_fill(~there, 0.0)).sum(dim=-1).sum(dim=0)  # (K,)
+    who = examples.teams[rows, place]  # (T, K)
+    real = torch.from_numpy(who != ABSENT).to(device)
+    log_chance = (log_odds[steps, rows, np.maximum(who, 0)] * real).sum(dim=0)  # (K,)
+    entropy = -((log_odds.exp() * log_odds.masked_fill(~there, 0.0)).sum(dim=-1) * real).sum(dim=0)  # (K,)
 
     inverses = np.maximum(examples.inverses, np.finfo(np.float64).tiny)  # age may have brought it down to 0
-    counts = (torch.from_numpy(x).to(device).float() for x in (np.log(inverses), examples.weights / inverses))
-    loss = shortfall(log_chance, *counts)
+    log_inverses, outcomes = (
+        torch.from_numpy(x).to(device).float() for x in (np.log(inverses), examples.weights / inverses)
+    )
+    share = torch.softmax(log_chance + log_inverses, dim=0)
+    loss = 2.0 - 2.0 * (share * outcomes).sum()
     least = least_entropy(allowed, entropy_clip)
     if least > 0:
-        loss = loss - entropy_coef * entropy.clamp(max=least).mean() / least
+        loss = loss - entropy_coef * (share * entropy.clamp(max=least)).sum() / least
     return loss
-
-
-def shortfall(log_chance: Tensor, log_inverses: Tensor, outcomes: Tensor) -> Tensor:
-    """Returns 2 - 2 V, with the slope of -2 mean(c D (o - V)) / mean(c D).
-
-    Args:
-        log_chance: (K,) ln D.
-        log_inverses: (K,) ln c, up to a constant.
-        outcomes: (K,) o.
-    """
-    share = torch.softmax((log_chance + log_inverses).detach(), dim=0)  # c D / sum(c D)
-    expected = (share * outcomes).sum()  # V
-    push = (share * (outcomes - expected) * log_chance).sum()  # slope of D = D times that of ln D
-    return 2.0 - 2.0 * (expected + push - push.detach())
 
 
 def prefixes(teams: Ints, order: Ints) -> Ints:
     """Returns (T, K, T) what of ``teams`` is there before each step, when their places are filled in ``order``.
 
     Args:
-        teams: (K, T), no place OPEN.
+        teams: (K, T), no place OPEN; ABSENT places are so from the start.
         order: (K, T) the place filled at each step.
     """
     size = teams.shape[1]
     step_of = np.argsort(order, axis=1)  # (K, T) when each place is filled
-    return np.where(step_of < np.arange(size)[:, np.newaxis, np.newaxis], teams, OPEN)
+    there = (step_of < np.arange(size)[:, np.newaxis, np.newaxis]) | (teams == ABSENT)
+    return np.where(there, teams, OPEN)
 
 
 def least_entropy(allowed: Bools, clip: float) -> float:

@@ -26,7 +26,7 @@ class Average:
 
     Attributes:
         teams: (S', C, T).
-        responses: how many have come into it after the first.
+        responses: how many have come into it, the first included.
     """
 
     teams: Ints
@@ -34,11 +34,11 @@ class Average:
 
 
 def share(responses: int) -> float:
-    """Returns the share of the average that response number ``responses`` takes, from 1 on: 2 / (n + 1).
+    """Returns the share of the average that response number ``responses`` takes, counted from 1: 2 / (n + 1).
 
     So response n weighs n, and the first ones, which were learnt against next to nothing, are soon forgotten. With
-    1 / n all would weigh the same, as in Brown's fictitious play. Convergence asks only for shares that go to 0 and have
-    an infinite sum (Leslie and Collins 2006, generalised weakened fictitious play).
+    1 / n all would weigh the same, as in Brown's fictitious play. Convergence asks only for shares that go to 0 and
+    have an infinite sum (Leslie and Collins 2006, generalised weakened fictitious play).
     """
     return 2.0 / (responses + 1)
 
@@ -97,7 +97,7 @@ class Fictitious:
     def init(self, rng: Generator) -> FictitiousState:
         """Returns random weights; what they choose is the first response."""
         response = self.responder.init(rng)
-        return FictitiousState(response, Average(self._made(response, self.reservoir, rng), 0))
+        return FictitiousState(response, Average(self._made(response, self.reservoir, rng), 1))
 
     def select(self, state: FictitiousState, games: int, ages: Ints, rng: Generator) -> Lineups:
         """Returns games of a response, chosen for side b % S of game b, against teams of the average.
@@ -180,7 +180,7 @@ class Fictitious:
     def _averaged(self, average: Average, response: BerteamState, rng: Generator) -> Average:
         """Returns ``average`` with its share of teams, drawn uniformly, in which ``response`` takes their place."""
         responses, teams = average.responses + 1, average.teams.copy()
-        new = self._made(response, rng.binomial(self.reservoir, share(responses + 1)), rng)
+        new = self._made(response, rng.binomial(self.reservoir, share(responses)), rng)
         for side in range(self._kinds):
             teams[side, rng.permutation(self.reservoir)[: new.shape[1]]] = new[side]
         return Average(teams, responses)

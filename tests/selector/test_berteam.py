@@ -29,6 +29,9 @@ SMALL = {
     "capacity": 100,
     "weight_half_life": 0.0,
     "draw_weight": 0.0,
+    "loss": "mlm",
+    "entropy_coef": 0.5,
+    "entropy_clip": 0.3,
     "learning_rate": 1e-3,
     "layers": 1,
     "width": 16,
@@ -384,6 +387,8 @@ def test_weighted_learning_settles_where_shares_are_win_rates():
     ("settings", "name"),
     [
         ({"captain": "alphabetical"}, "selector.captain"),
+        ({"loss": "l2"}, "selector.loss"),
+        ({"loss": "l1"}, "selector.loss=l1 needs selector.weighting=true"),
         ({"position": "sideways"}, "selector.position"),
         ({"side": "upside"}, "selector.side"),
         ({"side": "separate"}, "selector.dataset"),
