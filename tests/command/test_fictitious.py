@@ -15,7 +15,10 @@ def test_resumed_it_ends_in_the_same_bytes(berteam, tmp_path):
     for name in UNTIMED:
         whole, halves = ((tmp_path / folder / f"{name}.csv").read_bytes() for folder in ("whole", "halves"))
         assert whole == halves, name
-    states = [(tmp_path / folder / "checkpoint.safetensors").read_bytes() for folder in ("whole", "halves")]
+    states = [
+        (tmp_path / folder / "checkpoint" / "epoch_00000004" / "tensors.safetensors").read_bytes()
+        for folder in ("whole", "halves")
+    ]
     assert states[0] == states[1]
     shares = read(tmp_path / "whole", "team_distribution").query("epoch == 4").probability * 100
     assert ((shares - shares.round()).abs() < 1e-9).all()  # of a hundred teams
