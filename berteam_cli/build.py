@@ -32,6 +32,7 @@ from berteam_cli.selector.berteam import Berteam
 from berteam_cli.selector.best_members import BestMembers
 from berteam_cli.selector.best_team import BestTeam
 from berteam_cli.selector.constraints import allowed
+from berteam_cli.selector.fictitious import Fictitious
 from berteam_cli.selector.mcaa import Mcaa
 from berteam_cli.selector.observations import looking
 from berteam_cli.selector.psro import Psro
@@ -157,8 +158,10 @@ def selector(config: TrainConfig, field: Field, game: Env, device: str) -> Selec
     if name == "berteam":
         settings["device"] = device
         settings["observations"] = looking(settings["observations"], game)
+    opponents, reservoir = settings.pop("opponents", "own"), settings.pop("reservoir", 0)
     try:
-        return SELECTORS[name](field=field, **settings)
+        chosen = SELECTORS[name](field=field, **settings)
+        return Fictitious(chosen, reservoir) if opponents == "average" else chosen
     except ValueError as error:
         raise InputError(str(error)) from error
 

@@ -12,7 +12,7 @@ import torch
 from numpy.random import Generator
 from torch import Tensor
 
-from berteam_cli.outcomes import OPEN, Experience, Floats, Ints, Lineups, Outcomes
+from berteam_cli.outcomes import OPEN, Bools, Experience, Floats, Ints, Lineups, Outcomes
 from berteam_cli.selector import beam
 from berteam_cli.selector.base import (
     Field,
@@ -23,6 +23,7 @@ from berteam_cli.selector.base import (
     unordered_teams,
 )
 from berteam_cli.selector.berteam_state import BerteamState, restored
+from berteam_cli.selector.best_response import best_response_loss
 from berteam_cli.selector.captains import SCHEMES, captains, opening
 from berteam_cli.selector.chances import (
     LARGEST_SUMMED,
@@ -40,6 +41,7 @@ from berteam_cli.selector.updates import untrained, updated
 from berteam_cli.selector.winners import Examples, Winners, harvest, in_parts, minibatch, no_winners, pushed
 
 CPU = torch.device("cpu")
+LOSSES = ("mlm", "l1")
 KNOWING = ("shared", "token", "separate")  # how a side that is chosen for is told from the others
 
 
@@ -57,9 +59,13 @@ class Berteam:
         train_every: epochs from one update to the next.
         batch_size: teams of an update.
         minibatch_size: teams of one gradient step; divides ``batch_size``.
-        capacity: winning teams that are remembered, in each ring.
+        capacity: winning teams that are remembered, in each ring; all teams where losers teach too.
         weight_half_life: wins after which a remembered team counts half; 0 for never.
         draw_weight: weight of each team of a draw; 0 leaves draws out.
+        loss: "mlm", winners are to be guessed; "l1", the best response is looked for (Appendix D, "Relation to Nash
+            Equilibria"), and losers teach too.
+        entropy_coef: beta of the L1 loss.
+        entropy_clip: its p, in [0, 1].
         learning_rate: Adam's.
         averaging: in [0, 1); teams are chosen with a mean of the weights after each gradient step, in which each counts
             so much of the next. 0 chooses with the newest weights.
@@ -85,6 +91,9 @@ class Berteam:
     capacity: int
     weight_half_life: float
     draw_weight: float
+    loss: str
+    entropy_coef: float
+    entropy_clip: float
     learning_rate: float
     averaging: float
     layers: int
@@ -98,7 +107,8 @@ class Berteam:
 
     def __post_init__(self) -> None:
         """Refuses settings that exclude each other."""
-        for name, allowed in (("captain", SCHEMES), ("position", POSITIONS), ("side", KNOWING)):
+        named = (("captain", SCHEMES), ("position", POSITIONS), ("side", KNOWING), ("loss", LOSSES))
+        for name, allowed in named:
             if getattr(self, name) not in allowed:
                 raise ValueError(f"selector.{name} must be one of {', '.join(allowed)}, but is {getattr(self, name)}.")
         if not 1 <= self.field.team_size <= LONGEST:
@@ -107,6 +117,8 @@ class Berteam:
             )
         if self.side == "separate" and self.dataset == "shared":
             raise ValueError("selector.side=separate needs selector.dataset=per_side: a network learns from its side.")
+        if self.loss == "l1" and not self.weighting:
+            raise ValueError("selector.loss=l1 needs selector.weighting=true: else it finds what was chosen often.")
         if self.batch_size % self.minibatch_size:
             raise ValueError(
                 f"selector.minibatch_size must divide selector.batch_size, "
@@ -158,6 +170,11 @@ class Berteam:
         sides = np.arange(self.field.sides if self.by_side else 1)
         known = np.broadcast_to(np.arange(self.field.sides) % len(sides), (games, self.field.sides))
         return self._chosen(self._odds(state, sides), known, ages, rng)
+
+    def select_for(self, state: BerteamState, sides: Ints, ages: Ints, rng: Generator) -> Lineups:
+        """Returns line-ups of one team each, (B, 1), as ``select`` makes them, for ``sides``, (B,)."""
+        owners = np.arange(self.field.sides if self.by_side else 1)
+        return self._chosen(self._odds(state, owners), (sides % len(owners))[:, np.newaxis], ages, rng)
 
     def answer(self, state: BerteamState, lineups: Lineups, seen: Experience, ages: Ints, rng: Generator) -> Lineups:
         """Returns a second game for each of ``lineups``: side b % S of game b chooses anew, on what its members saw.
@@ -232,9 +249,12 @@ class Berteam:
         self, state: BerteamState, outcomes: Outcomes, seen: Experience, fitness: Floats, rng: Generator
     ) -> tuple[BerteamState, Selecting]:
         """Remembers the winners and, every ``train_every`` epochs, trains the network to complete them."""
-        won = self._harvested(outcomes, seen)
+        return self.study(state, self.examples(outcomes, seen, np.ones_like(outcomes.scores, dtype=np.bool_)), rng)
+
+    def study(self, state: BerteamState, new: Examples, rng: Generator) -> tuple[BerteamState, Selecting]:
+        """Remembers the ``new`` examples of an epoch and, every ``train_every`` epochs, trains the network."""
         rings = tuple(
-            pushed(ring, won[np.flatnonzero(won.sides % len(state.winners) == k)], self.field.members)
+            pushed(ring, new[np.flatnonzero(new.sides % len(state.winners) == k)], self.field.members)
             for k, ring in enumerate(state.winners)
         )
         after = replace(state, winners=rings, epochs=state.epochs + 1)
@@ -309,8 +329,11 @@ class Berteam:
 
     def _loss(self, network: Callable[..., Tensor], examples: Examples, rng: Generator) -> Tensor:
         """Returns what an update goes down."""
-        looking = self.observations
-        return masking_loss(network, examples, self.field.members, looking.drop_input, looking.drop_player, rng)
+        drops = self.observations.drop_input, self.observations.drop_player
+        if self.loss == "l1":
+            entropy = self.entropy_coef, self.entropy_clip
+            return best_response_loss(network, examples, self.field.allowed, *entropy, *drops, rng)
+        return masking_loss(network, examples, self.field.members, *drops, rng)
 
     @property
     def _exchangeable(self) -> bool:
@@ -358,21 +381,28 @@ class Berteam:
             chances = estimated_log_chances(doubted, teams, flat, begun, rng)
         return Lineups(teams.reshape(*leaders.shape, -1), leaders, chances.reshape(leaders.shape))
 
-    def _harvested(self, outcomes: Outcomes, seen: Experience) -> Examples:
-        """Returns the teams of an epoch to learn from, with what was known when they were chosen."""
+    def examples(self, outcomes: Outcomes, seen: Experience, chosen: Bools) -> Examples:
+        """Returns the teams of an epoch to learn from, with what was known when they were chosen.
+
+        Args:
+            outcomes: of the epoch's games.
+            seen: what the players saw in them.
+            chosen: (B, S) whose outcomes count.
+        """
         games, sides = outcomes.scores.shape
-        chosen = np.ones((games, sides), dtype=np.bool_)
+        chosen = chosen.copy()
         known = nothing_seen((games, sides), self.field.team_size, self.observations.rows, self.observations.numbers)
         if self.observations.use == "self":
             known = self._seen(seen, games)
         if self.answers:
             first, second = np.arange(games // 2), np.arange(games // 2, games)
             chooser = first % sides
-            chosen[second] = chooser[:, np.newaxis] == np.arange(sides)
+            chosen[second] &= chooser[:, np.newaxis] == np.arange(sides)
             looked = self._seen(seen, games)[first, chooser]
             known.rows[second, chooser], known.lengths[second, chooser] = looked.rows, looked.lengths
         log_uniform = -float(np.log(self.field.allowed.sum(axis=1)).sum()) if self.weighting else None
-        return harvest(outcomes, known, chosen, self.draw_weight, self.weight_cap, log_uniform)
+        losers = self.loss == "l1"
+        return harvest(outcomes, known, chosen, self.draw_weight, self.weight_cap, log_uniform, losers=losers)
 
     def _seen(self, experience: Experience, games: int) -> Seen:
         """Returns what the members of all teams saw in ``games`` games, (B, S)."""

@@ -19,10 +19,12 @@ class Examples:
 
     Attributes:
         teams: (K, T) members.
-        weights: (K,).
+        weights: (K,) outcome times ``inverses``; 0 for a team that lost.
         sides: (K,) the side each team played.
         rows: (K, T, R, O) float16, what each member saw of the opponent before the team was chosen.
         lengths: (K, T) how many of the R rows hold something; 0 where nothing was seen.
+        inverses: (K,) of the chance that the team was chosen, as a multiple of that in uniform choice; 1 where wins do
+            not weigh by it.
     """
 
     teams: Ints
@@ -30,6 +32,7 @@ class Examples:
     sides: Ints
     rows: npt.NDArray[np.float16]
     lengths: Ints
+    inverses: Floats
 
     def __len__(self) -> int:
         return len(self.teams)
@@ -76,6 +79,7 @@ def no_winners(capacity: int, team_size: int, rows: int = 0, numbers: int = 0) -
             np.zeros(capacity, dtype=np.int64),
             np.zeros((capacity, team_size, rows, numbers), dtype=np.float16),
             np.zeros((capacity, team_size), dtype=np.int64),
+            np.zeros(capacity),
         ),
         0,
     )
@@ -117,6 +121,8 @@ def check(examples: Examples, members: int) -> None:
 def minibatch(rings: Sequence[Winners], size: int, half_life: float, rng: Generator) -> Examples:
     """Returns ``size`` examples drawn uniformly with replacement, as many of each ring, weights scaled to a mean of 1.
 
+    Where all of them lost, their weights stay 0. ``inverses`` are scaled by the same number.
+
     Args:
         rings: not all empty; those that are give nothing.
         size: how many to draw.
@@ -128,11 +134,13 @@ def minibatch(rings: Sequence[Winners], size: int, half_life: float, rng: Genera
     rows = [rng.integers(len(ring), size=share) for ring, share in zip(filled, shares, strict=True)]
     parts = [ring.held[drawn] for ring, drawn in zip(filled, rows, strict=True)]
     examples = Examples(*(np.concatenate([getattr(part, x.name) for part in parts]) for x in fields(Examples)))
-    weights = examples.weights
+    weights, inverses = examples.weights, examples.inverses
     if half_life > 0:
         ages = np.concatenate([ring.ages[drawn] for ring, drawn in zip(filled, rows, strict=True)])
-        weights = weights * 0.5 ** ((ages - ages.min()) / half_life)  # only ratios matter; the youngest cannot vanish
-    return replace(examples, weights=weights / weights.mean())
+        kept = 0.5 ** ((ages - ages.min()) / half_life)  # only ratios matter; the youngest cannot vanish
+        weights, inverses = weights * kept, inverses * kept
+    scale = weights.mean() if weights.any() else 1.0
+    return replace(examples, weights=weights / scale, inverses=inverses / scale)
 
 
 def in_parts(examples: Examples, size: int) -> list[tuple[Examples, float]]:
@@ -143,7 +151,14 @@ def in_parts(examples: Examples, size: int) -> list[tuple[Examples, float]]:
 
 
 def harvest(
-    outcomes: Outcomes, seen: Seen, chosen: Bools, draw_weight: float, weight_cap: float, log_uniform: float | None
+    outcomes: Outcomes,
+    seen: Seen,
+    chosen: Bools,
+    draw_weight: float,
+    weight_cap: float,
+    log_uniform: float | None,
+    *,
+    losers: bool = False,
 ) -> Examples:
     """Returns the teams to learn from, games in order.
 
@@ -158,14 +173,16 @@ def harvest(
         draw_weight: factor for the teams of a draw; 0 leaves them out.
         weight_cap: largest weight before that factor.
         log_uniform: ln U to weight by inverse probability; None to give every team weight 1.
+        losers: whether teams of weight 0 are kept too.
     """
     scores, lineups = outcomes.scores, outcomes.lineups
     value = np.where(scores == 1.0, 1.0, np.where(scores > 0.0, draw_weight, 0.0))  # (B, S)
-    kept = (value > 0) & chosen
-    weights = value[kept]
+    kept = ((value > 0) | losers) & chosen
+    inverses = np.ones(int(kept.sum()))
     if log_uniform is not None:
         chances = lineups.log_chances[kept]
         if np.isnan(chances).any():
             raise ValueError("selector.weighting needs log_chances of every team, but some are NaN.")
-        weights = weights * np.exp(np.minimum(log_uniform - chances, np.log(weight_cap)))
-    return Examples(lineups.teams[kept], weights, np.nonzero(kept)[1], seen.rows[kept], seen.lengths[kept])
+        inverses = np.exp(np.minimum(log_uniform - chances, np.log(weight_cap)))
+    sides = np.nonzero(kept)[1]
+    return Examples(lineups.teams[kept], value[kept] * inverses, sides, seen.rows[kept], seen.lengths[kept], inverses)

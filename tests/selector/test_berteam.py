@@ -29,6 +29,9 @@ SMALL = {
     "capacity": 100,
     "weight_half_life": 0.0,
     "draw_weight": 0.0,
+    "loss": "mlm",
+    "entropy_coef": 0.5,
+    "entropy_clip": 0.3,
     "learning_rate": 1e-3,
     "averaging": 0.0,
     "layers": 1,
@@ -386,6 +389,8 @@ def test_weighting_fits_win_rates_and_no_weighting_the_replicator(weighting):
     ("settings", "name"),
     [
         ({"captain": "alphabetical"}, "selector.captain"),
+        ({"loss": "l2"}, "selector.loss"),
+        ({"loss": "l1"}, "selector.loss=l1 needs selector.weighting=true"),
         ({"position": "sideways"}, "selector.position"),
         ({"side": "upside"}, "selector.side"),
         ({"side": "separate"}, "selector.dataset"),

@@ -28,7 +28,7 @@ def examples(teams, weights, sides=None):
     teams = np.asarray(teams)
     sides = np.zeros(len(teams), dtype=np.int64) if sides is None else np.asarray(sides)
     nothing = nothing_seen((len(teams),), teams.shape[1])
-    return Examples(teams, np.asarray(weights, dtype=float), sides, nothing.rows, nothing.lengths)
+    return Examples(teams, np.asarray(weights, dtype=float), sides, nothing.rows, nothing.lengths, np.ones(len(teams)))
 
 
 def pushed(winners, teams, weights):
