@@ -410,12 +410,13 @@ class Berteam:
 
     def _minibatches(self, rings: tuple[Winners, ...], rng: Generator) -> Iterator[list[tuple[Examples, float]]]:
         """Yields the minibatches of an update, each drawn anew, in parts that the memory holds."""
-        rows = rings[0].held.rows
+        field, players = self.field, rings[0].held.rows.shape[1:3]
+        prefixes = field.team_size if self.loss == "l1" else 1  # rows of the network that one team takes
         for _ in range(self.batch_size // self.minibatch_size):
             examples = minibatch(rings, self.minibatch_size, self.weight_half_life, rng)
             if self.side != "token":
                 examples = replace(examples, sides=np.zeros_like(examples.sides))
-            yield in_parts(examples, self._network.rows(self.field.team_size, *rows.shape[1:3]))
+            yield in_parts(examples, max(1, self._network.rows(field.team_size, *players) // prefixes))
 
     def _open(self, count: int) -> Ints:
         """Returns (count, T) teams that nobody stands in yet."""

@@ -26,6 +26,7 @@ LONGEST = 512  # T; BERT's
 ROWS = 2048  # teams that are worked on at a time; more do not go faster
 NUMBERS = 2**23  # that a call may keep at a time, 32 MiB, and twice as many in training; bounds the memory
 KEPT_IN_TRAINING = 30  # vectors of each place and layer that wait for the gradient
+KEPT_OF_STEPS = 60  # vectors of each observation that do; an LSTM of two layers keeps most
 KEPT_IN_USE = 14  # vectors of each place that live at a time: four wide, and what goes into and out of them
 
 
@@ -90,7 +91,8 @@ class TeamNetwork(nn.Module):
         width, heads, layers = layer.self_attn.embed_dim, layer.self_attn.num_heads, len(self.writer.decoder.layers)
         if self.training:
             each = layers * (KEPT_IN_TRAINING * width * places + 4 * heads * places**2) + 4 * self.members * places
-            each += players * KEPT_IN_TRAINING * width * (steps + layers)
+            if steps:  # else the source is one token
+                each += players * width * (KEPT_OF_STEPS * steps + KEPT_IN_TRAINING * layers)
             return max(1, 2 * NUMBERS // each)
         return min(ROWS, max(1, NUMBERS // (places * (KEPT_IN_USE * width + 4 * self.members))))
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.random import Generator
 
-from berteam_cli.outcomes import OPEN, Bools, Floats, Ints, Outcomes
+from berteam_cli.outcomes import ABSENT, OPEN, Bools, Floats, Ints, Outcomes
 from berteam_cli.selector.observations import Seen
 
 
@@ -18,7 +18,7 @@ class Examples:
     """Teams to learn from.
 
     Attributes:
-        teams: (K, T) members.
+        teams: (K, T) members; ABSENT behind the members of a team smaller than T.
         weights: (K,) outcome times ``inverses``; 0 for a team that lost.
         sides: (K,) the side each team played.
         rows: (K, T, R, O) float16, what each member saw of the opponent before the team was chosen.
@@ -68,7 +68,7 @@ def no_winners(capacity: int, team_size: int, rows: int = 0, numbers: int = 0) -
 
     Args:
         capacity: C.
-        team_size: T.
+        team_size: T, of the largest team.
         rows: R, observations kept of each member.
         numbers: O, numbers of an observation.
     """
@@ -89,7 +89,7 @@ def pushed(winners: Winners, new: Examples, members: int) -> Winners:
     """Returns ``winners`` with the examples ``new`` pushed one after the other.
 
     Raises:
-        ValueError: a member is not in [0, ``members``), or a weight is negative or not finite.
+        ValueError: as of ``check``.
     """
     check(new, members)
     if not len(new):
@@ -108,9 +108,13 @@ def check(examples: Examples, members: int) -> None:
     """Checks what the network is to learn from.
 
     Raises:
-        ValueError: a member is not in [0, ``members``), or a weight is negative or not finite.
+        ValueError: a member is not in [0, ``members``), one stands behind an ABSENT place, a team has none, or a weight
+            is negative or not finite.
     """
-    outside = (examples.teams < 0) | (examples.teams >= members)
+    absent = examples.teams == ABSENT
+    if absent[:, 0].any() or (absent[:, :-1] & ~absent[:, 1:]).any():
+        raise ValueError("a team to learn from must have a member, and ABSENT places behind its members alone.")
+    outside = ~absent & ((examples.teams < 0) | (examples.teams >= members))
     if outside.any():
         raise ValueError(f"a team to learn from has member {examples.teams[outside][0]}, but there are {members}.")
     wrong = ~(np.isfinite(examples.weights) & (examples.weights >= 0))

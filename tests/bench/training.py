@@ -1,4 +1,4 @@
-"""Speed of training: whole runs by the real command, selectors, and how soon a run starts."""
+"""Speed of training: whole runs by the real command, and how soon a run starts."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
-from berteam_cli.training import begin, epoch
-from tests.bench.timing import Row, parts, seconds
+from tests.bench.timing import Row, seconds
 
 BERTEAM = str(Path(sys.executable).with_name("berteam"))
 WARM = 6  # epochs before the rollouts of 2,048 steps are full for the first time, and kernels are loaded
@@ -74,34 +72,6 @@ def side_by_side_rows() -> Iterator[Row]:
     yield "two runs side by side, times one after the other", f"{together / alone:.2f}", "1.1"
 
 
-def selector_rows() -> Iterator[Row]:
-    made = parts("experiment=paper_comparison", "selector.train_every=1")
-    selector, run = made.selector, begin(made)
-    ages = np.zeros(60, dtype=np.int64)
-    rng = np.random.default_rng(0)
-    lineups = selector.select(run.selection, 25, ages, rng)
-    outcomes = epoch(run, parts("experiment=paper_comparison", "population=islands4x15", "env.max_time_s=5"))[
-        1
-    ].outcomes
-    outcomes.scores[:] = [1, 0]
-    assert len(lineups) == 25
-    yield (
-        "BERTeam update, 512 teams in minibatches of 64, s",
-        f"{seconds(lambda: selector.learn(run.selection, outcomes, rng)):.2f}",
-        "0.3",
-    )
-    yield (
-        "BERTeam, teams of 25 games, ms",
-        f"{1000 * seconds(lambda: selector.select(run.selection, 25, ages, rng)):.0f}",
-        "",
-    )
-    yield (
-        "BERTeam, total distribution, 60 members, teams of 2, ms",
-        f"{1000 * seconds(lambda: selector.distribution(run.selection)):.0f}",
-        "(goal 50)",
-    )
-
-
 def start_rows() -> Iterator[Row]:
     def quiet(*words: str) -> None:
         subprocess.run([BERTEAM, *words], stdout=subprocess.DEVNULL, check=True)
@@ -112,4 +82,4 @@ def start_rows() -> Iterator[Row]:
         yield "berteam train until the first game, s", f"{seconds(lambda: quiet(*words), 3):.1f}", "5"
 
 
-ROWS = (epoch_rows, side_by_side_rows, selector_rows, start_rows)
+ROWS = (epoch_rows, side_by_side_rows, start_rows)

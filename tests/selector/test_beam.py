@@ -5,6 +5,7 @@ from berteam_cli.selector.base import unordered_teams
 from berteam_cli.selector.beam import likeliest
 from berteam_cli.selector.chances import total_distribution
 from berteam_cli.selector.filling import proposal
+from tests.selector.odds import at_places
 from tests.selector.test_chances import field, rules, table
 
 
@@ -42,6 +43,7 @@ def test_a_needle_among_billions_of_teams_is_found():
     """Each place leads on: nearly all of the mass is on one team of 40^8, whose chance is known."""
     members, size, right = 40, 8, 0.97
 
+    @at_places
     def odds(teams, known):
         chances = np.full((*teams.shape, members), (1 - right) / (members - 1))
         chances[..., np.arange(size), 5 * np.arange(size) % members] = right

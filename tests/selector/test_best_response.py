@@ -34,7 +34,9 @@ def test_it_finds_the_best_of_eight_teams(seed):
     rng = np.random.default_rng(seed)
     state = selector.init(rng)
     weighted = [examples(np.tile(all_teams(2, 3), (8, 1)), np.tile(TABLE, 8))] * 400
-    learnt, _ = updated(selector._network, state.learnt[0], weighted, selector._loss, rng, learning_rate=2e-3)
+    learnt, _ = updated(
+        selector._network, state.learnt[0], weighted, selector._loss, rng, learning_rate=2e-3, averaging=0.0
+    )
     total = selector.distribution(replace(state, learnt=(learnt,)))
     drawn = selector.sample(replace(state, learnt=(learnt,)), 1000, rng)
     teams, counts = np.unique(drawn, axis=0, return_counts=True)

@@ -18,6 +18,7 @@ from berteam_cli.selector.chances import (
     unordered_chances,
 )
 from berteam_cli.selector.filling import filled, proposal, within
+from tests.selector.odds import at_places
 
 sizes = st.sampled_from([(1, 1), (1, 3), (4, 1), (2, 2), (5, 2), (3, 3), (2, 4)])
 seeds = st.integers(0, 2**16)
@@ -26,6 +27,7 @@ seeds = st.integers(0, 2**16)
 def table(members, seed, exchangeable=False):
     """Returns conditionals that are arbitrary, but always the same for the same partial team."""
 
+    @at_places
     def odds(teams, known):
         chances = np.empty((*teams.shape, members))
         for k, (team, source) in enumerate(zip(teams + 1, known, strict=True)):
@@ -83,6 +85,7 @@ def test_property_total_distribution_sums_to_one(size, seed, exchangeable):
     members, team_size = size
     asked = []
 
+    @at_places
     def odds(teams, known):
         asked.append(teams)
         return table(members, seed, exchangeable)(teams, known)

@@ -4,6 +4,7 @@ from hypothesis import strategies as st
 
 from berteam_cli.outcomes import OPEN
 from berteam_cli.selector.filling import drawn, filled, noise, proposal, towards_uniform, within
+from tests.selector.odds import at_places
 
 
 def test_noise_by_hand():
@@ -54,6 +55,7 @@ def test_property_held_places_stay_and_open_ones_get_members(members, size, seed
     teams[open_] = OPEN
     before = teams.copy()
 
+    @at_places
     def odds(partial, known):
         assert np.all((partial >= OPEN) & (partial < members))
         return rng.dirichlet(np.ones(members), size=partial.shape)
@@ -67,17 +69,18 @@ def test_property_held_places_stay_and_open_ones_get_members(members, size, seed
 def test_the_network_is_asked_once_per_place_and_never_twice_about_one_team():
     asked = []
 
-    def odds(partial, known):
-        assert len(np.unique(np.column_stack([known, partial]), axis=0)) == len(partial)
+    def odds(partial, known, places):
+        assert len(np.unique(np.column_stack([known, places, partial]), axis=0)) == len(partial)
         asked.append(len(partial))
-        return np.full((*partial.shape, 4), 0.25)
+        return np.full((len(partial), 4), 0.25)
 
     filled(odds, np.full((1000, 3), OPEN), np.zeros(1000, dtype=int), np.random.default_rng(0))
-    assert asked == [1, 3 * 4, 3 * 4 * 4]
+    assert asked == [3, 2 * 3 * 4, 3 * 4 * 4]  # places, then those open beside a filled one, and so on
 
 
 def test_every_order_of_filling_is_equally_likely():
     # Member k is the k-th to come, so a team tells the order it was filled in.
+    @at_places
     def odds(partial, known):
         step = (partial != OPEN).sum(axis=1)
         return np.repeat(np.eye(3)[step][:, np.newaxis], 3, axis=1)
@@ -89,6 +92,7 @@ def test_every_order_of_filling_is_equally_likely():
 
 
 def test_noise_is_applied_to_every_place():
+    @at_places
     def odds(partial, known):
         return np.broadcast_to(np.eye(4)[0], (*partial.shape, 4)).copy()
 
@@ -102,6 +106,7 @@ def test_noise_is_applied_to_every_place():
 
 
 def test_what_is_known_of_each_team_reaches_the_network_with_it():
+    @at_places
     def odds(partial, known):
         return np.repeat(np.eye(3)[known][:, np.newaxis], 2, axis=1)
 
@@ -119,6 +124,6 @@ def test_within_the_rules_by_hand():
 
 def test_noise_comes_before_the_rules():
     doubt, allowed = np.array([1.0, 0.0, 0.0]), np.array([[True, True, False]])
-    odds = proposal(lambda teams, known: np.array([[[0.0, 0.2, 0.8]]]), doubt, allowed)
+    odds = proposal(at_places(lambda teams, known: np.array([[[0.0, 0.2, 0.8]]])), doubt, allowed)
     # 1/3 : 0.2 : 0.8 after the noise, of which the first two are left.
     np.testing.assert_allclose(odds(np.array([[OPEN]]), np.array([0]))[0, 0], [5 / 8, 3 / 8, 0])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from berteam_cli.outcomes import NOBODY, Lineups, Outcomes
+from berteam_cli.outcomes import ABSENT, NOBODY, Lineups, Outcomes
 from berteam_cli.selector import winners as memory
 from berteam_cli.selector.observations import nothing_seen
 from berteam_cli.selector.winners import Examples, minibatch, no_winners
@@ -165,11 +165,22 @@ def test_rings_are_learnt_from_alike_however_full_they_are():
     assert np.bincount(drawn.teams[:, 0]).tolist() == [32, 32]
 
 
+def test_smaller_teams_are_held_beside_larger_ones():
+    teams = np.array([[3, ABSENT, ABSENT], [0, 1, 2], [2, 2, ABSENT]])
+    winners = pushed(no_winners(5, 3), teams, np.ones(3))
+    assert np.array_equal(winners.held.teams[:3], teams)
+    drawn = minibatch([winners], 100, 0.0, np.random.default_rng(0)).teams
+    assert np.array_equal(np.unique(drawn, axis=0), np.unique(teams, axis=0))
+
+
 @pytest.mark.parametrize(
     ("teams", "weights", "said"),
     [
         ([[0, 4]], [1], "member 4, but there are 4"),
         ([[-1, 0]], [1], "member -1"),
+        ([[1, -3]], [1], "member -3"),
+        ([[ABSENT, ABSENT]], [1], "must have a member"),
+        ([[ABSENT, 0]], [1], "behind its members alone"),
         ([[0, 1]], [-0.5], "but one is -0.5"),
         ([[0, 1]], [math.nan], "but one is nan"),
         ([[0, 1]], [math.inf], "but one is inf"),
