@@ -158,10 +158,11 @@ def selector(config: TrainConfig, field: Field, game: Env, device: str) -> Selec
     if name == "berteam":
         settings["device"] = device
         settings["observations"] = looking(settings["observations"], game)
-    opponents, reservoir = settings.pop("opponents", "own"), settings.pop("reservoir", 0)
+    opponents = settings.pop("opponents", "own")
+    average = {key: settings.pop(key) for key in ("reservoir", "sharpening") if key in settings}
     try:
         chosen = SELECTORS[name](field=field, **settings)
-        return Fictitious(chosen, reservoir) if opponents == "average" else chosen
+        return Fictitious(chosen, **average) if opponents == "average" else chosen
     except ValueError as error:
         raise InputError(str(error)) from error
 

@@ -232,6 +232,7 @@ class BerteamConfig(SelectorConfig):
     entropy_clip: float = number(0, 1)
     opponents: str = choice("own", "average")
     reservoir: int = number(1)
+    sharpening: float = number(1, 1000)
     learning_rate: float = number(open_low=True)
     averaging: float = number(0, 0.9999)
     layers: int = number(1, 64)

@@ -33,7 +33,7 @@ from berteam_cli.selector.chances import (
     total_distribution,
 )
 from berteam_cli.selector.embedders import Embedder, embedder
-from berteam_cli.selector.filling import Odds, drawn, filled, noise, proposal
+from berteam_cli.selector.filling import Odds, drawn, filled, noise, proposal, sharpened
 from berteam_cli.selector.masking import masking_loss
 from berteam_cli.selector.network import LONGEST, POSITIONS, TeamNetwork, by_owner, odds_of, seeded
 from berteam_cli.selector.observations import Looking, Seen, nothing_seen, seen_in
@@ -193,7 +193,13 @@ class Berteam:
         return Lineups(teams, leaders, chances)
 
     def sample(
-        self, state: BerteamState, count: int, rng: Generator, side: int | None = None, seen: Seen | None = None
+        self,
+        state: BerteamState,
+        count: int,
+        rng: Generator,
+        side: int | None = None,
+        seen: Seen | None = None,
+        sharpening: float = 1.0,
     ) -> Ints:
         """Returns (count, T) teams filled from nobody, without noise.
 
@@ -203,6 +209,7 @@ class Berteam:
             rng: the only source of chance.
             side: for which; None for one drawn at random for each team.
             seen: (count,) what the members of each saw of the opponent; None for nothing.
+            sharpening: power of the conditionals; above 1 the likelier teams come even more often.
         """
         sides = self._sides(side)
         if seen is None:
@@ -211,7 +218,7 @@ class Berteam:
         else:
             known = np.arange(count)
             odds = self._odds(state, sides[known % len(sides)], seen)
-        return filled(self._own(odds), self._open(count), known, rng)
+        return filled(sharpened(self._own(odds), sharpening), self._open(count), known, rng)
 
     def distribution(self, state: BerteamState, side: int | None = None) -> TeamDistribution:
         """Returns the total distribution (paper, Section 5) over unordered teams; N^(T-1) grows fast.

@@ -58,10 +58,13 @@ class Fictitious:
     Attributes:
         responder: learns the best response; with the L1 loss.
         reservoir: C, teams that stand for the average.
+        sharpening: power of the conditionals of the teams by which a response joins the average: it has to be soft to
+            learn what it does not choose, and what joins need not be.
     """
 
     responder: Berteam
     reservoir: int
+    sharpening: float
 
     def __post_init__(self) -> None:
         """Refuses what is no best response."""
@@ -186,9 +189,11 @@ class Fictitious:
         return Average(teams, responses)
 
     def _made(self, response: BerteamState, count: int, rng: Generator) -> Ints:
-        """Returns (S', count, T) teams that ``response`` makes of its own will."""
+        """Returns (S', count, T) teams that ``response`` makes of its own will, sharpened."""
         sides = range(self._kinds) if self.by_side else (None,)
-        return np.stack([self.responder.sample(response, count, rng, side) for side in sides])
+        return np.stack(
+            [self.responder.sample(response, count, rng, side, sharpening=self.sharpening) for side in sides]
+        )
 
 
 def responding(games: int, sides: int) -> Ints:

@@ -78,6 +78,16 @@ def proposal(odds: Odds, noise: Floats, allowed: Bools) -> Odds:
     return proposed
 
 
+def sharpened(odds: Odds, power: float) -> Odds:
+    """Returns ``odds`` with every chance to a ``power``, > 0, and normalised; 1 changes nothing."""
+
+    def sharp(teams: Ints, known: Ints, places: Ints | None = None) -> Floats:
+        chances = odds(teams, known, places) ** power
+        return chances / chances.sum(axis=-1, keepdims=True)
+
+    return odds if power == 1 else sharp
+
+
 def drawn(chances: Floats, rng: Generator) -> Ints:
     """Returns (K,) one column of each row of ``chances``, (K, C), drawn in proportion to them."""
     reached = np.cumsum(chances, axis=1)

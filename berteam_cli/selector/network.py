@@ -198,7 +198,8 @@ def odds_of(network: TeamNetwork, weights: dict[str, Tensor], sides: Ints, seen:
         memory, absent = functional_call(network.reader, reading, inputs)
 
     def odds(teams: Ints, known: Ints, places: Ints | None = None) -> Floats:
-        network.eval()
+        if network.training:  # saying so to all modules each time takes as long as they do
+            network.eval()
         chances = np.empty((*teams.shape[: 2 if places is None else 1], network.members))
         size = network.rows(teams.shape[1])
         with torch.inference_mode():

@@ -3,7 +3,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from berteam_cli.outcomes import OPEN
-from berteam_cli.selector.filling import drawn, filled, noise, proposal, towards_uniform, within
+from berteam_cli.selector.filling import drawn, filled, noise, proposal, sharpened, towards_uniform, within
 from tests.selector.odds import at_places
 
 
@@ -120,6 +120,15 @@ def test_within_the_rules_by_hand():
     odds = np.array([[0.2, 0.5, 0.3], [0.6, 0.0, 0.4]])
     np.testing.assert_allclose(within(odds, allowed), [[0.4, 0, 0.6], [0, 1, 0]])
     assert within(odds, np.ones((2, 3), dtype=np.bool_)) is odds
+
+
+def test_sharpened_by_hand():
+    odds = at_places(lambda teams, known: np.array([[[0.2, 0.4, 0.4], [0.0, 0.5, 0.5]]]))
+    sharp = sharpened(odds, 2.0)
+    np.testing.assert_allclose(
+        sharp(np.array([[OPEN, OPEN]]), np.array([0]))[0], [[1 / 9, 4 / 9, 4 / 9], [0, 0.5, 0.5]]
+    )
+    assert sharpened(odds, 1.0) is odds
 
 
 def test_noise_comes_before_the_rules():
