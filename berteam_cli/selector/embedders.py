@@ -57,7 +57,7 @@ class Lstm(Embedder):
 
     def embedded(self, steps: Tensor, lengths: Tensor) -> Tensor:
         """Returns (R, d) the outputs at the last step that counts; what follows it cannot reach it."""
-        # Packing the sequences takes up to twice as long as computing steps that nobody reads, and never less.
+        # Packing the sequences takes up to twice as long as computing steps that nobody reads.
         outputs, _ = self.lstm(steps)
         return outputs[torch.arange(len(steps), device=steps.device), lengths - 1]
 

@@ -8,7 +8,7 @@ SB3 = ("train", "population=ppo6", "learner=sb3")
 
 CASES = {
     ("trian",): "'trian' is no command.*Did you mean train",
-    ("train", "selector=mcca"): "selector must be one of berteam, mcaa, uniform, but is 'mcca'.*Did you mean mcaa",
+    ("train", "selector=mcca"): "selector must be one of .*berteam, .*mcaa, .*uniform, but is 'mcca'.*Did you mean mcaa",
     ("train", "population=ppo5"): "population must be one of .*Did you mean ppo50",
     ("train", "-m", "selector=mcaa,berteem"): "'berteem'.*Did you mean berteam",
     ("train", "selecter=mcaa"): "selecter is no key.*Did you mean selector",
@@ -99,6 +99,19 @@ CASES = {
     ("train", "env=rps", "population=fixed_policies"): "policies.*env=rps.*rock",
     ("train", "env=rps", "population=ppo6", "optimizer=mapelites"): "optimizer.opponents.*rock",
     ("train", "selector=mcaa", "optimizer.fitness=elo"): "selector=mcaa has none",
+    ("train", "team_size=513"): "team_size must be >= 1 and <= 512, but is 513",
+    ("train", "selector.exact_limit=0"): "selector.exact_limit must be >= 1, but is 0",
+    ("train", "selector.valid_members=[0]"): r"valid_members must have an entry for each of the 2 places, but has 1\.",
+    ("train", "selector.valid_members=[[],0]"): r"valid_members\[0\] must leave somebody for the place",
+    ("train", "selector=mcaa", "selector.valid_members=[pp064,0]"): r"valid_members\[0\].*Did you mean ppo64",
+    ("train", "selector=uniform", "selector.valid_members=[0,60]"): r"valid_members\[1\].*0 to 59\), but has 60",
+    ("train", "selector.side=separate"): "selector.side=separate needs selector.dataset=per_side",
+    ("train", "selector.observations=selv"): "selector.observations.use must be one of none, previous_game, self",
+    ("train", "selector.observations=previous_game", "games_per_epoch=5"): "games_per_epoch must be even",
+    ("train", "selector.loss=l1"): "selector.weighting",
+    ("train", "selector.opponents=average"): "selector.opponents=average needs selector.loss=l1",
+    ("train", "selector=mcaa", "selector.top_fraction=0"): "selector.top_fraction must be > 0",
+    ("train", "selector=psro", "selector.solver=nahs"): "selector.solver must be one of nash, replicator, uniform",
     ("train", "selector.heads=3"): "selector.*heads",
     ("train", "selector.minibatch_size=1000"): "selector.minibatch_size",
     (

@@ -180,7 +180,7 @@ def test_sweep(process, tmp_path):
 
 
 def test_sampled_distribution_says_so(berteam, tmp_path):
-    words = ["env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "epochs=1", "record_teams=4"]
+    words = ["env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "epochs=1", "selector.exact_limit=4"]
     berteam("train", *words, "out=run")
     table = read(tmp_path / "run", "team_distribution")
     assert list(table[table.epoch == 1].team[-1:]) == ["other"]
