@@ -8,7 +8,7 @@ SB3 = ("train", "population=ppo6", "learner=sb3")
 
 CASES = {
     ("trian",): "'trian' is no command.*Did you mean train",
-    ("train", "selector=mcca"): "selector must be one of .*berteam, .*mcaa, .*uniform, but is 'mcca'.*Did you mean mcaa",
+    ("train", "selector=mcca"): "selector must be one of .*, mcaa, .*, but is 'mcca'.*Did you mean mcaa",
     ("train", "population=ppo5"): "population must be one of .*Did you mean ppo50",
     ("train", "-m", "selector=mcaa,berteem"): "'berteem'.*Did you mean berteam",
     ("train", "selecter=mcaa"): "selecter is no key.*Did you mean selector",
