@@ -34,7 +34,7 @@ check: setup ## replays the recorded games
 	$(BIN)/python -m mctf.check tests/traces/*.npz tests/traces/*.csv
 
 picture: setup ## the pictures of the README and docs
-	$(BIN)/berteam train experiment=paper_fixed epochs=600 out=outputs/picture on_exists=overwrite
+	$(BIN)/berteam train experiment=paper_fixed out=outputs/picture on_exists=overwrite
 	$(BIN)/python docs/picture.py outputs/picture docs/picture.png
 	$(BIN)/python docs/field.py docs/field.png
 
