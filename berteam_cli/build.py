@@ -101,7 +101,8 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
     watched = improving.learns or selecting.observes
     games_kept = config.games_per_epoch // rounds(selecting) if watched and not read_only else 0
     if not read_only:
-        check_memory(islands, playing.env, games_kept)
+        # Both halves of an epoch of answers, and all of it in one piece.
+        check_memory(islands, playing.env, 4 * games_kept if selecting.answers else games_kept)
     return Parts(
         seed=config.seed,
         games_per_epoch=config.games_per_epoch,

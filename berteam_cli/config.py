@@ -197,7 +197,7 @@ class PsroConfig(ListedConfig):
     gamma: float = number(0, 1)
     expand_every: int = number(1)
     candidates: int = number(1)
-    capacity: int = number(1)
+    capacity: int = number(2)
     half_life: float = number()
 
 

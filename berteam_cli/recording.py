@@ -58,6 +58,7 @@ class Recorder:
         self.tables.add("learning", self.learning_rows(run, report))
         self.tables.add("generations", self.generation_rows(run, report))
         figures = (selecting.loss, selecting.updates, selecting.buffer, effective, entropy, exploited)
+        figures += (selecting.skipped,)
         self.tables.add("selector", [(run.epoch, *figures)])
         clock.lap("record_s")
         seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}

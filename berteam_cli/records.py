@@ -39,7 +39,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("epoch", "island", "removed", "parent", "removed_fitness", "parent_fitness", "removed_age", "reason"),
     ),
     "learning": ("epoch", "agent", "algorithm", *LEARNING_FIGURES),
-    "selector": ("epoch", "loss", "updates", "buffer", "effective_teams", "entropy", "exploitability"),
+    "selector": ("epoch", "loss", "updates", "buffer", "effective_teams", "entropy", "exploitability", "skipped"),
     "timing": (
         *("epoch", "select_s", "play_s", "learn_s", "renew_s", "selector_s", "record_s", "env_steps", "probe_s"),
     ),

@@ -33,9 +33,9 @@ from berteam_cli.optimizer.aggression import aggression
 from berteam_cli.outcomes import Floats
 from berteam_cli.population import island_of, names, policies
 from berteam_cli.records import COLUMNS, EVALUATION, team_name, write_table
-from berteam_cli.selector.base import TeamDistribution, measured, orderings, team_count
+from berteam_cli.selector.base import TeamDistribution, measured, team_count
 from berteam_cli.selector.embeddings import Embedding, cosines, groups, mean_cosine, nearest
-from berteam_cli.selector.independent import every_team
+from berteam_cli.selector.independent import anybody, distribution, with_all_teams
 from berteam_cli.stored import stored_config
 from berteam_cli.training import PAYOFFS, Parts, Probes, Run, generator, key
 
@@ -145,14 +145,15 @@ def learned_mix(run: Run, parts: Parts, most: int, rng: Generator) -> TeamDistri
     learned = measured(parts.selector, run.selection, rng)
     if learned.samples:
         return "The teams are too many for an exact distribution (selector.exact_limit)"
-    return every_team(learned, field)
+    return with_all_teams(learned, field)
 
 
 def reference_points(run: Run, parts: Parts, learned: TeamDistribution, games_per_pair: int, rng: Generator) -> Points:
     """Returns the reference points of all teams of ``run``, after each played each."""
     acting = policies(parts.optimizer.islands, run.population, explore=False)
     played = payoffs(parts.games, acting, learned.teams, games_per_pair, rng)
-    orders = orderings(learned.teams)
+    # In proportion to the orders in which the members of each team may stand.
+    orders = distribution(anybody(parts.selector.field), parts.selector.field).probability
     limit = replicator(played.wins, orders / orders.sum(), STEPS)[-1]
     return Points(played, learned, fixed_point(played.wins, orders), limit, nash(played.zero_sum))
 

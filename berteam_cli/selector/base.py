@@ -73,7 +73,7 @@ class TeamDistribution:
         """Entropy over the listed teams, in nats; ``other`` counts as one team."""
         chances = np.append(self.probability, self.other)
         chances = chances[chances > 0]
-        return float(-(chances * np.log(chances)).sum())
+        return float(-(chances * np.log(chances)).sum()) + 0.0  # a sure team has 0, not -0
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,7 @@ class Selecting:
 
     Attributes:
         updates: gradient steps.
+        skipped: updates that were due, with nothing to learn from.
         loss: their mean loss, NaN without any.
         buffer: teams it learns from now.
     """
@@ -89,14 +90,19 @@ class Selecting:
     updates: int = 0
     loss: float = float("nan")
     buffer: int = 0
+    skipped: int = 0
 
 
 class Plain:
-    """What selectors share that neither look at games nor answer them."""
+    """What selectors share that neither look at games nor answer them, nor tell sides apart."""
 
     observes = False
     answers = False
     by_side = False
+
+    def lists(self, state: Any) -> bool:
+        """Returns False: it chooses from all teams there can be."""
+        return False
 
     def remarks(self) -> list[str]:
         """Returns nothing to remark."""
@@ -112,7 +118,7 @@ class Selector(Protocol[S]):
         answers: whether every second game of an epoch is against the opponents of the one before, with a team that
             ``answer`` chooses on what was seen of them.
         by_side: whether a team's chance depends on the side it plays; then ``sample`` and ``distribution`` take a
-            ``side``, and without one mean a team for a side drawn at random.
+            ``side``, and without one mean a team for each side in turn.
     """
 
     field: Field
@@ -138,6 +144,9 @@ class Selector(Protocol[S]):
 
     def distribution(self, state: S) -> TeamDistribution:
         """Returns how likely each unordered team is, exactly. Lists every team whose chance is not 0."""
+
+    def lists(self, state: S) -> bool:
+        """Returns whether it chooses from a list of teams, whose chances are known however many there could be."""
 
     def likeliest(self, state: S, count: int, rng: Generator) -> TeamDistribution:
         """Returns the ``count`` most probable unordered teams, or those that a search among very many finds."""
@@ -240,7 +249,7 @@ def measured(selector: Selector[Any], state: Any, rng: Generator, **side: int) -
     With ``side`` it is that for one side, of a selector that tells them apart. A sampled distribution lists the
     ``exact_limit`` most frequent teams with the standard errors of their shares; the rest is its ``other``.
     """
-    if exactly(selector.field):
+    if exactly(selector.field) or selector.lists(state):
         return selector.distribution(state, **side)
     samples = sample_size(selector.field.team_size)
     drawn = np.sort(selector.sample(state, samples, rng, **side), axis=1)

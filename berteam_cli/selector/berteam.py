@@ -79,7 +79,7 @@ class Berteam(BerteamLearning):
             state: what was learnt so far.
             count: how many.
             rng: the only source of chance.
-            side: for which; None for one drawn at random for each team.
+            side: for which; None for each side in turn, side k % S for the k-th team.
             seen: (count,) what the members of each saw of the opponent; None for nothing.
             sharpening: power of the conditionals; above 1 the likelier teams come even more often.
         """
@@ -107,6 +107,10 @@ class Berteam(BerteamLearning):
         teams = unordered_teams(self.field.members, self.field.team_size)
         possible = chances > 0
         return TeamDistribution(teams[possible], chances[possible] / chances.sum())  # rounding
+
+    def lists(self, state: BerteamState) -> bool:
+        """Returns False: it chooses from all teams there can be."""
+        return False
 
     def likeliest(self, state: BerteamState, count: int, rng: Generator) -> TeamDistribution:
         """Returns the ``count`` most probable unordered teams; by a beam search where they cannot all be listed.

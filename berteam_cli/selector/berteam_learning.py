@@ -26,6 +26,7 @@ from berteam_cli.selector.winners import Examples, Winners, harvest, in_parts, m
 
 CPU = torch.device("cpu")
 LOSSES = ("mlm", "l1")
+LARGEST_COMPARED = 16  # T of the L1 loss, which reads T partial teams for each team of a minibatch at once
 KNOWING = ("shared", "token", "separate")  # how a side that is chosen for is told from the others
 
 
@@ -101,6 +102,11 @@ class BerteamLearning:
             )
         if self.side == "separate" and self.dataset == "shared":
             raise ValueError("selector.side=separate needs selector.dataset=per_side: a network learns from its side.")
+        if self.loss == "l1" and self.field.team_size > LARGEST_COMPARED:
+            raise ValueError(
+                f"selector.loss=l1 needs teams of at most {LARGEST_COMPARED}, whose minibatches fit the memory whole, "
+                f"but they have {self.field.team_size} members."
+            )
         if self.loss == "l1" and not self.weighting:
             raise ValueError("selector.loss=l1 needs selector.weighting=true: else it finds what was chosen often.")
         if self.batch_size % self.minibatch_size:
@@ -156,8 +162,10 @@ class BerteamLearning:
         )
         after = replace(state, winners=rings, epochs=state.epochs + 1)
         held = sum(len(ring) for ring in rings)
-        if after.epochs % self.train_every or not held:
+        if after.epochs % self.train_every:
             return after, Selecting(buffer=held)
+        if not held:
+            return after, Selecting(skipped=1)
         learnt, losses = list(state.learnt), []
         for k, before in enumerate(state.learnt):
             own = (rings[k],) if self.side == "separate" else rings
@@ -205,12 +213,13 @@ class BerteamLearning:
     def _minibatches(self, rings: tuple[Winners, ...], rng: Generator) -> Iterator[list[tuple[Examples, float]]]:
         """Yields the minibatches of an update, each drawn anew, in parts that the memory holds."""
         field, players = self.field, rings[0].held.rows.shape[1:3]
-        prefixes = field.team_size if self.loss == "l1" else 1  # rows of the network that one team takes
         for _ in range(self.batch_size // self.minibatch_size):
             examples = minibatch(rings, self.minibatch_size, self.weight_half_life, rng)
             if self.side != "token":
                 examples = replace(examples, sides=np.zeros_like(examples.sides))
-            yield in_parts(examples, max(1, self._network.rows(field.team_size, *players) // prefixes))
+            # The L1 loss compares the teams of a minibatch with each other: it has to see them all.
+            whole = self.loss == "l1"
+            yield in_parts(examples, len(examples) if whole else self._network.rows(field.team_size, *players))
 
     def tensors(self, state: BerteamState) -> dict[str, Any]:
         """Returns all that ``state`` holds as named tensors, without copies."""

@@ -71,7 +71,7 @@ def best_response_loss(
     log_odds = torch.log_softmax(logits[steps, rows, place].masked_fill(~there, -torch.inf), dim=-1)  # (T, K, N)
     who = examples.teams[rows, place]  # (T, K)
     real = torch.from_numpy(who != ABSENT).to(device)
-    log_chance = (log_odds[steps, rows, np.maximum(who, 0)] * real).sum(dim=0)  # (K,)
+    log_chance = log_odds[steps, rows, np.maximum(who, 0)].masked_fill(~real, 0.0).sum(dim=0)  # (K,)
     entropy = -((log_odds.exp() * log_odds.masked_fill(~there, 0.0)).sum(dim=-1) * real).sum(dim=0)  # (K,)
 
     inverses = np.maximum(examples.inverses, np.finfo(np.float64).tiny)  # age may have brought it down to 0

@@ -82,7 +82,7 @@ class BestTeam(Listed):
         if len(rung) > 1:
             return replace(state, rung=rung), Selecting(updates=1, buffer=len(rung))
         again = self._begun(rng) if self.restart else rung
-        return BestTeamState(again, rung.teams), Selecting(updates=1, buffer=len(again))
+        return BestTeamState(again, rung.teams.copy()), Selecting(updates=1, buffer=len(again))
 
     def tensors(self, state: BestTeamState) -> dict[str, Any]:
         """Returns ``state`` as tensors."""

@@ -46,7 +46,8 @@ def log_chances(odds: Odds, teams: Ints, known: Ints, opening: Floats) -> Floats
         for c, row in enumerate((1 << subsets).sum(axis=1)):
             for i in np.flatnonzero(~inside[c]):
                 reach[row | 1 << i] += reach[row] * step[c, :, i]
-    return np.log(reach[-1])
+    with np.errstate(divide="ignore"):  # what the rules forbid has the chance 0
+        return np.log(reach[-1])
 
 
 def in_some_orders(odds: Odds, teams: Ints, known: Ints, opening: Floats, orders: int, rng: Generator) -> Floats:
@@ -139,7 +140,8 @@ def log_chance_on_the_way(odds: Odds, teams: Ints, known: Ints, rng: Generator) 
             chances[part] = np.take_along_axis(asked, teams[part], axis=1)
         copies = (same & left[:, np.newaxis]).sum(axis=2)  # a member that is left twice is one choice
         chances = np.where(left, chances / np.maximum(copies, 1), 0.0)
-        log_chance += np.log(chances.sum(axis=1))
+        with np.errstate(divide="ignore"):  # the members that are left may all be forbidden there
+            log_chance += np.log(chances.sum(axis=1))
         chosen = drawn(np.maximum(chances, left * np.finfo(np.float64).tiny), rng)
         partial[rows, place] = teams[rows, chosen]
         left[rows, chosen] = False

@@ -129,6 +129,10 @@ class Fictitious:
         teams, counts = np.unique(np.sort(held, axis=1), axis=0, return_counts=True)
         return TeamDistribution(teams, counts / len(held))
 
+    def lists(self, state: FictitiousState) -> bool:
+        """Returns True: the average is a list of teams."""
+        return True
+
     def likeliest(self, state: FictitiousState, count: int, rng: Generator) -> TeamDistribution:
         """Returns the ``count`` most frequent unordered teams of the average."""
         return most_probable(self.distribution(state), count)

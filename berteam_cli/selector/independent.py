@@ -40,10 +40,14 @@ def distribution(chances: Floats, field: Field) -> TeamDistribution:
     return TeamDistribution(teams[possible], probability[possible])
 
 
-def every_team(listed: TeamDistribution, field: Field) -> TeamDistribution:
+def anybody(field: Field) -> Floats:
+    """Returns (T, N) equal chances for all who may stand at each place."""
+    return within(np.full((field.team_size, field.members), 1 / field.members), field.allowed)
+
+
+def with_all_teams(listed: TeamDistribution, field: Field) -> TeamDistribution:
     """Returns the exact distribution ``listed`` with a row for each team that may be, also where its chance is 0."""
-    uniform = within(np.full((field.team_size, field.members), 1 / field.members), field.allowed)
-    teams = distribution(uniform, field).teams
+    teams = distribution(anybody(field), field).teams
     chance = dict(zip(map(tuple, listed.teams), listed.probability, strict=True))
     return TeamDistribution(teams, np.array([chance.get(tuple(team), 0.0) for team in teams]))
 

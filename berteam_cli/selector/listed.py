@@ -21,7 +21,6 @@ from berteam_cli.selector.base import (
     team_count,
     unordered_teams,
 )
-from berteam_cli.selector.filling import within
 
 ORDERS_EACH = 20  # where places differ, ordered teams are listed up to so many for each team that may be listed
 TRIES = 20  # teams drawn for each one that is to be new
@@ -71,23 +70,27 @@ class Listed(Plain):
         """Returns the chance of each unordered team."""
         will = self.mixture(state)
         if will is None:
-            return independent.distribution(anybody(self.field), self.field)
+            return independent.distribution(independent.anybody(self.field), self.field)
         possible = will.probability > 0
         teams, chances = np.sort(will.teams[possible], axis=1), will.probability[possible]
         order = np.lexsort(teams.T[::-1])
         return TeamDistribution(teams[order], chances[order])
 
+    def lists(self, state: Any) -> bool:
+        """Returns whether it knows whom it wants."""
+        return self.mixture(state) is not None
+
     def likeliest(self, state: Any, count: int, rng: Generator) -> TeamDistribution:
         """Returns the ``count`` most probable teams."""
         if self.mixture(state) is None:
-            return independent.top(anybody(self.field), self.field, count, rng, listed=exactly(self.field))
+            return independent.top(independent.anybody(self.field), self.field, count, rng, listed=exactly(self.field))
         return most_probable(self.distribution(state), count)
 
     def captains(self, state: Any) -> Floats:
         """Returns (N,) how often each member stands at a place: a captain stands at a place drawn at random."""
         will = self.mixture(state)
         if will is None:
-            return anybody(self.field).mean(axis=0)
+            return independent.anybody(self.field).mean(axis=0)
         weights = np.repeat(will.probability / self.field.team_size, self.field.team_size)
         return np.bincount(will.teams.ravel(), weights=weights, minlength=self.field.members)
 
@@ -111,11 +114,6 @@ class Listed(Plain):
         schedule = rng.permuted(rng.permutation(schedule), axis=1).ravel()
         shares = np.bincount(schedule, minlength=len(teams)) / len(schedule)
         return lineups(self.field, teams[schedule], Mixture(teams, shares), self.explore, rng)
-
-
-def anybody(field: Field) -> Floats:
-    """Returns (T, N) equal chances for all who may stand at each place."""
-    return within(np.full((field.team_size, field.members), 1 / field.members), field.allowed)
 
 
 def random_teams(field: Field, count: int, rng: Generator) -> Ints:
@@ -157,7 +155,7 @@ def lineups(field: Field, chosen: Ints, will: Mixture | None, explore: float, rn
 def log_chances(field: Field, teams: Ints, will: Mixture | None, explore: float) -> Floats:
     """Returns (K,) ln of the chance that each of the ordered ``teams``, (K, T), plays; see ``lineups``."""
     with np.errstate(divide="ignore"):  # what cannot be has the chance 0
-        uniform = independent.log_chances(anybody(field), teams)
+        uniform = independent.log_chances(independent.anybody(field), teams)
         if will is None:
             return uniform
         which = places_of(teams, will.teams)

@@ -99,7 +99,7 @@ class Mcaa(Plain):
         members = state.wins if state.tally is None else self._of_the_best(state.tally, len(state.logits))
         if state.epochs % self.train_every or not members.any():
             teams = len(state.tally) if state.tally is not None else int(state.wins.sum()) // self.field.team_size
-            return state, Selecting(buffer=teams)
+            return state, Selecting(buffer=teams, skipped=int(state.epochs % self.train_every == 0))
         shares = state.shares
         error = members / members.sum() - shares
         step = shares * (error - shares @ error)

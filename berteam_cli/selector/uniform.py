@@ -12,7 +12,7 @@ from berteam_cli.outcomes import Experience, Floats, Ints, Lineups, Outcomes
 from berteam_cli.selector import independent
 from berteam_cli.selector.base import Field, Plain, Selecting, TeamDistribution, exactly
 from berteam_cli.selector.captains import captains, opening
-from berteam_cli.selector.filling import drawn, within
+from berteam_cli.selector.filling import drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +73,7 @@ class Uniform(Plain):
 
     def _chances(self) -> Floats:
         """Returns (T, N) the chance of each member at each place."""
-        field = self.field
-        return within(np.full((field.team_size, field.members), 1 / field.members), field.allowed)
+        return independent.anybody(self.field)
 
     def _log_chances(self, teams: Ints, begun: Floats) -> Floats:
         """Returns (K,) ln of the chance of each of ``teams``, over all captains it could have."""

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from safetensors.torch import load, save
 
 from berteam_cli.selector.base import Field
 from berteam_cli.selector.best_team import BestTeam, better_half
@@ -102,3 +103,11 @@ def test_tensors_and_back():
         np.testing.assert_array_equal(getattr(again.rung, name), getattr(state.rung, name))
     np.testing.assert_array_equal(again.choice, state.choice)
     assert state.choice.shape == (1, 2)
+
+
+def test_the_state_after_the_last_halving_can_be_saved():
+    selector = bandit(restart=False)
+    state = trained(selector, by_strength(strength), epochs=60)
+    assert len(state.rung) == 1
+    tensors = {name: tensor.contiguous() for name, tensor in selector.tensors(state).items()}
+    assert load(save(tensors))["choice"].tolist() == [[1, 3]]  # no two share memory, which cannot be saved
