@@ -33,7 +33,7 @@ def test_it_finds_the_best_of_eight_teams(seed):
     selector = made(2, 3, weighting=True, loss="l1", dropout=0.0, width=32, heads=4)
     rng = np.random.default_rng(seed)
     state = selector.init(rng)
-    weighted = [examples(np.tile(all_teams(2, 3), (8, 1)), np.tile(TABLE, 8))] * 400
+    weighted = [[(examples(np.tile(all_teams(2, 3), (8, 1)), np.tile(TABLE, 8)), 1.0)]] * 400
     learnt, _ = updated(
         selector._network, state.learnt[0], weighted, selector._loss, rng, learning_rate=2e-3, averaging=0.0
     )
@@ -148,3 +148,20 @@ def test_the_mean_over_orders_is_the_chance_of_the_team():
     drawn = selector.sample(state, 20_000, np.random.default_rng(1))
     share = np.all(drawn == team, axis=1).mean()
     assert abs(share - np.mean(along)) < 5 * np.sqrt(np.mean(along) / 20_000)
+
+
+def test_a_smaller_team_is_learnt_from_where_rules_keep_others_from_its_absent_place():
+    """Member 0 may not stand at the second place, which the first team does not have."""
+    logits = torch.zeros(3, requires_grad=True)
+    teams = np.array([[1, ABSENT], [0, 2]])
+    allowed = np.array([[True, True, True], [False, True, True]])
+
+    def network(shown, *_):
+        return logits.expand(len(shown), 2, 3)
+
+    rng = np.random.default_rng(0)
+    loss = best_response_loss(network, examples(teams, [1.0, 0.0]), allowed, 0.5, 0.3, 0.0, 0.0, rng)
+    loss.backward()
+    assert torch.isfinite(loss)
+    assert torch.isfinite(logits.grad).all()
+    assert logits.grad.any()
