@@ -72,11 +72,11 @@ def played_out(selector, play, epochs, seed, games=512):
 # --- the average approaches an equilibrium
 
 
-@pytest.mark.parametrize(("team_size", "epochs", "bound"), [(1, 60, 0.05), (2, 200, 0.15)])
-def test_hands_are_hard_to_exploit(team_size, epochs, bound):
+@pytest.mark.parametrize(("team_size", "epochs", "sharpening", "bound"), [(1, 60, 1.0, 0.05), (2, 140, 2.0, 0.18)])
+def test_hands_are_hard_to_exploit(team_size, epochs, sharpening, bound):
     """In the game of two, the only equilibrium never shows two equal hands; 900 epochs get below 0.05 there."""
     games, teams = Games(Rps(team_size), Workers(1)), unordered_teams(3, team_size)
-    selector = fictitious(3, team_size, **FAST)
+    selector = fictitious(3, team_size, sharpening=sharpening, **FAST)
     average = played_out(selector, lambda lineups, epoch, _: games.play(HANDS, lineups, epoch)[0], epochs, seed=7)
     assert exploitability(rps_gains(team_size), teams, average) < bound
     if team_size == 2:
@@ -127,7 +127,7 @@ def test_only_the_response_is_learnt_from_and_losers_teach_too():
 
 @pytest.mark.parametrize("side", ["token", "separate"])
 def test_sides_have_averages_of_their_own(side):
-    selector = fictitious(3, 1, reservoir=2000, side=side, dataset="per_side")
+    selector = fictitious(3, 1, reservoir=2000, sharpening=1.0, side=side, dataset="per_side")
     rng = np.random.default_rng(0)
     state = selector.init(rng)
     total = np.zeros(3)

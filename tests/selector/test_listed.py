@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from berteam_cli.outcomes import NOBODY
 from berteam_cli.selector.base import Field
+from berteam_cli.selector.independent import anybody
 from berteam_cli.selector.listed import (
     Listed,
     Mixture,
-    anybody,
     every_team,
     fresh,
     lineups,
