@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 
 import numpy as np
+import torch
 
 from berteam_cli.selector.embedders import EMBEDDERS
 from berteam_cli.training import begin
@@ -16,6 +17,7 @@ from tests.bench.timing import Row, parts, seconds
 
 def selector_rows() -> Iterator[Row]:
     """On one thread, as in a run, whose Workers give torch no more."""
+    torch.set_num_threads(1)
     batched = seconds(update(60, 2))
     yield "BERTeam update, 512 teams in minibatches of 64, 60 members, s", f"{batched:.2f}", "0.3"
     yield "  times as long one team at a time", f"{seconds(update(60, 2, one_by_one=True), 1) / batched:.0f}", ""
