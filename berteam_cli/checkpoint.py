@@ -17,6 +17,7 @@ from safetensors.torch import load_file, save_file
 
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.population import ARRAYS, Population
+from berteam_cli.tensors import below
 from berteam_cli.training import Parts, Run
 
 log = logging.getLogger("berteam")
@@ -149,11 +150,6 @@ def alone(tensor: torch.Tensor) -> torch.Tensor:
     """Returns ``tensor``, or a copy where it is part of a larger one, whose memory another part may share."""
     whole = tensor.untyped_storage().nbytes() == tensor.nbytes
     return tensor if whole else tensor.clone()
-
-
-def below(tensors: dict[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
-    """Returns the tensors whose names begin with ``prefix``, without it."""
-    return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}
 
 
 def digest(path: Path) -> str:

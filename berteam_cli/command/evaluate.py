@@ -12,11 +12,9 @@ import pandas as pd
 from numpy.random import Generator
 from rich.console import Console
 
-from berteam_cli import build, checkpoint
 from berteam_cli.command.inspect import printed
-from berteam_cli.config import checked
 from berteam_cli.env.mctf import Mctf
-from berteam_cli.errors import InputError, RunError
+from berteam_cli.errors import InputError
 from berteam_cli.evaluation.conditioning import Encounters, encounters
 from berteam_cli.evaluation.equilibria import (
     Equilibrium,
@@ -28,15 +26,14 @@ from berteam_cli.evaluation.equilibria import (
 )
 from berteam_cli.evaluation.payoffs import Payoffs, payoffs
 from berteam_cli.evaluation.reference import reference, reference_teams
-from berteam_cli.folder import read_manifest
 from berteam_cli.optimizer.aggression import aggression
 from berteam_cli.outcomes import Floats
 from berteam_cli.population import island_of, names, policies
+from berteam_cli.reading import last_state
 from berteam_cli.records import COLUMNS, EVALUATION, team_name, write_table
 from berteam_cli.selector.base import TeamDistribution, measured, team_count
 from berteam_cli.selector.embeddings import Embedding, cosines, groups, mean_cosine, nearest
 from berteam_cli.selector.independent import anybody, distribution, with_all_teams
-from berteam_cli.stored import stored_config
 from berteam_cli.training import PAYOFFS, Parts, Probes, Run, generator, key
 
 STEPS = 10_000  # of the replicator, after which it has settled
@@ -59,12 +56,7 @@ def evaluate(folder: Path, top: int, most: int, games_per_pair: int) -> None:
     Raises:
         InputError: there is no such run, it has no checkpoint, or its folder cannot be written.
     """
-    read_manifest(folder)
-    parts = build.parts_to_read(checked(stored_config(folder)))
-    try:
-        run = checkpoint.load(folder, parts).run
-    except RunError as error:
-        raise InputError(str(error)) from error
+    parts, run = last_state(folder)
     console = Console(width=None if Console().is_terminal else 120)
     console.print(f"{folder} after epoch {run.epoch}", highlight=False)
     playing, looking, meeting = generator(parts.seed, PAYOFFS, run.epoch).spawn(3)

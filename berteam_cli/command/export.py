@@ -7,15 +7,13 @@ from pathlib import Path
 import numpy as np
 from gymnasium.spaces import Box
 
-from berteam_cli import build, checkpoint
-from berteam_cli.config import checked
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
-from berteam_cli.errors import InputError, RunError, did_you_mean
-from berteam_cli.folder import read_manifest, write_whole
+from berteam_cli.errors import InputError, did_you_mean
+from berteam_cli.folder import write_whole
 from berteam_cli.learner.exporting import exported
 from berteam_cli.population import island_of, names
-from berteam_cli.stored import stored_config
+from berteam_cli.reading import last_state
 
 KEYS = ("agent", "out", "on_exists")
 ON_EXISTS = ("error", "overwrite")
@@ -32,12 +30,7 @@ def export(folder: Path, overrides: list[str]) -> Path:
         InputError: there is no such run or member, it has no networks, or a file is in the way.
     """
     given = read_overrides(overrides)
-    read_manifest(folder)
-    parts = build.parts_to_read(checked(stored_config(folder)))
-    try:
-        run = checkpoint.load(folder, parts).run
-    except RunError as error:
-        raise InputError(str(error)) from error
+    parts, run = last_state(folder)
     islands = parts.optimizer.islands
     agent = member(given["agent"], run.population.size)
     path = place(folder, agent, given)

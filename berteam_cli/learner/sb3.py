@@ -21,8 +21,9 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.mlp import Singles
 from berteam_cli.learner.sb3_feeding import Figures, exploration, fed
 from berteam_cli.learner.sb3_models import algorithm_class, built, check_options
-from berteam_cli.learner.sb3_state import below, buffer_of, held, networks_of, take, take_networks
+from berteam_cli.learner.sb3_state import buffer_of, held, networks_of, take, take_networks
 from berteam_cli.outcomes import Experience
+from berteam_cli.tensors import below
 from berteam_cli.workers import Workers
 
 

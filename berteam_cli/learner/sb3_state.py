@@ -10,6 +10,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import BaseBuffer
 from stable_baselines3.common.on_policy_algorithm import OnPolicyAlgorithm
 
+from berteam_cli.tensors import below
+
 COUNTERS = ("num_timesteps", "_n_updates", "_n_calls")  # the last is that of targets, where there are any
 ROLLOUT = ("observations", "actions", "rewards", "episode_starts", "values", "log_probs")
 REPLAY = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
@@ -69,8 +71,3 @@ def take_networks(model: BaseAlgorithm, tensors: Mapping[str, torch.Tensor]) -> 
         state.setdefault(int(index), {})[name] = tensor.clone()
     groups = policy.optimizer.state_dict()["param_groups"]  # settings, and a learning rate that each update sets
     policy.optimizer.load_state_dict({"state": state, "param_groups": groups})
-
-
-def below(tensors: Mapping[str, torch.Tensor], prefix: str) -> dict[str, torch.Tensor]:
-    """Returns the tensors whose names begin with ``prefix``, without it."""
-    return {name.removeprefix(prefix): tensor for name, tensor in tensors.items() if name.startswith(prefix)}

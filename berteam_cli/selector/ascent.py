@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from berteam_cli.outcomes import Bools, Floats, Ints
+from berteam_cli.selector.listed import distinct
 
 SWEEPS = 4  # over all places, at most
 
@@ -41,8 +42,3 @@ def climbed(teams: Ints, value: Callable[[Ints], Floats], allowed: Bools) -> Int
         kept = distinct(teams)  # climbs that met go on as one
         teams, best = teams[kept], best[kept]
     return teams
-
-
-def distinct(teams: Ints) -> Ints:
-    """Returns the first row of each of the different ``teams``, (J, T), in lexicographic order of their members."""
-    return np.unique(np.sort(teams, axis=1), axis=0, return_index=True)[1]

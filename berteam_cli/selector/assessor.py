@@ -21,11 +21,11 @@ from berteam_cli.outcomes import OPEN, Experience, Floats, Ints, Lineups, Outcom
 from berteam_cli.rating.elo import softmax
 from berteam_cli.selector.ascent import climbed
 from berteam_cli.selector.base import Selecting
-from berteam_cli.selector.berteam_state import KINDS, below
 from berteam_cli.selector.listed import Listed, Mixture, every_team, fresh, new_among
 from berteam_cli.selector.network import seeded
 from berteam_cli.selector.outcome_network import OutcomeNetwork, foretold
-from berteam_cli.selector.updates import Learnt, untrained, updated
+from berteam_cli.selector.updates import Learnt, check_minibatches, restored, untrained, updated
+from berteam_cli.tensors import below
 
 CPU = torch.device("cpu")
 STARTS = 4  # random teams that a search climbs from, beside as many of those that played
@@ -95,11 +95,7 @@ class Assessor(Listed):
 
     def __post_init__(self) -> None:
         """Refuses settings that exclude each other."""
-        if self.batch_size % self.minibatch_size:
-            raise ValueError(
-                f"selector.minibatch_size must divide selector.batch_size, "
-                f"but {self.minibatch_size} does not divide {self.batch_size}."
-            )
+        check_minibatches(self.batch_size, self.minibatch_size)
 
     def init(self, rng: Generator) -> AssessorState:
         """Returns random weights and no games."""
@@ -144,9 +140,7 @@ class Assessor(Listed):
     def tensors(self, state: AssessorState) -> dict[str, Any]:
         """Returns all that ``state`` holds as named tensors, without copies."""
         named: dict[str, Any] = {"pushed": torch.tensor(state.pushed), "epochs": torch.tensor(state.epochs)}
-        for kind in KINDS:
-            named |= {f"learnt.{kind}.{name}": value for name, value in getattr(state.learnt, kind).items()}
-        named["learnt.steps"] = torch.tensor(state.learnt.steps)
+        named |= {f"learnt.{name}": value for name, value in state.learnt.tensors().items()}
         arrays = {
             "ring.teams": state.ring.teams,
             "ring.scores": state.ring.scores,
@@ -157,9 +151,8 @@ class Assessor(Listed):
 
     def restored(self, tensors: dict[str, Any]) -> AssessorState:
         """Returns the state that ``tensors`` gave these."""
-        kinds = {kind: below(tensors, f"learnt.{kind}.") for kind in KINDS}
         return AssessorState(
-            Learnt(**kinds, steps=int(tensors["learnt.steps"])),
+            restored(below(tensors, "learnt."), "cpu"),
             Games(tensors["ring.teams"].numpy(), tensors["ring.scores"].numpy()),
             int(tensors["pushed"]),
             Mixture(tensors["will.teams"].numpy(), tensors["will.probability"].numpy()),

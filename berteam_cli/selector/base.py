@@ -94,7 +94,7 @@ class Selecting:
 
 
 class Plain:
-    """What selectors share that neither look at games nor answer them, nor tell sides apart."""
+    """What holds of selectors that say nothing else: they neither look at games nor answer them."""
 
     observes = False
     answers = False
@@ -205,23 +205,20 @@ def unordered_teams(members: int, team_size: int) -> Ints:
 
 def orderings(teams: Ints) -> Floats:
     """Returns (K,) in how many orders the members of each of ``teams``, (K, T) ascending, can stand."""
-    size = teams.shape[1]
-    counts = np.ones(len(teams))
-    run = np.ones(len(teams))  # how long the current run of equal members is
-    for place in range(1, size):
-        run = np.where(teams[:, place] == teams[:, place - 1], run + 1, 1)
-        counts *= run
-    return math.factorial(size) / counts
+    return math.factorial(teams.shape[1]) / repeats(teams).prod(axis=1)
 
 
 def log_orderings(teams: Ints) -> Floats:
     """Returns (K,) ln of ``orderings``, for teams of any size."""
-    size = teams.shape[1]
-    repeats, run = np.zeros(len(teams)), np.ones(len(teams))
-    for place in range(1, size):
-        run = np.where(teams[:, place] == teams[:, place - 1], run + 1, 1)
-        repeats += np.log(run)
-    return math.lgamma(size + 1) - repeats
+    return math.lgamma(teams.shape[1] + 1) - np.log(repeats(teams)).sum(axis=1)
+
+
+def repeats(teams: Ints) -> Floats:
+    """Returns (K, T) how many times the member at each place of ``teams``, ascending, has stood so far."""
+    run = np.ones(teams.shape)
+    for place in range(1, teams.shape[1]):
+        run[:, place] = np.where(teams[:, place] == teams[:, place - 1], run[:, place - 1] + 1, 1)
+    return run
 
 
 SAMPLES = 20_000  # teams drawn where they are too many to list

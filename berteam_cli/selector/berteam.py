@@ -39,13 +39,13 @@ class Berteam(BerteamLearning):
             ages: (N,) epochs since each member was last replaced.
             rng: the only source of chance.
         """
-        sides = np.arange(self.field.sides if self.by_side else 1)
+        sides = self._sides(None)
         known = np.broadcast_to(np.arange(self.field.sides) % len(sides), (games, self.field.sides))
         return self._chosen(self._odds(state, sides), known, ages, rng)
 
     def select_for(self, state: BerteamState, sides: Ints, ages: Ints, rng: Generator) -> Lineups:
         """Returns line-ups of one team each, (B, 1), as ``select`` makes them, for ``sides``, (B,)."""
-        owners = np.arange(self.field.sides if self.by_side else 1)
+        owners = self._sides(None)
         return self._chosen(self._odds(state, owners), (sides % len(owners))[:, np.newaxis], ages, rng)
 
     def answer(self, state: BerteamState, lineups: Lineups, seen: Experience, ages: Ints, rng: Generator) -> Lineups:
@@ -107,10 +107,6 @@ class Berteam(BerteamLearning):
         teams = unordered_teams(self.field.members, self.field.team_size)
         possible = chances > 0
         return TeamDistribution(teams[possible], chances[possible] / chances.sum())  # rounding
-
-    def lists(self, state: BerteamState) -> bool:
-        """Returns False: it chooses from all teams there can be."""
-        return False
 
     def likeliest(self, state: BerteamState, count: int, rng: Generator) -> TeamDistribution:
         """Returns the ``count`` most probable unordered teams; by a beam search where they cannot all be listed.

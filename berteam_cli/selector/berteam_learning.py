@@ -13,7 +13,7 @@ from numpy.random import Generator
 from torch import Tensor
 
 from berteam_cli.outcomes import Bools, Experience, Floats, Outcomes
-from berteam_cli.selector.base import Field, Selecting
+from berteam_cli.selector.base import Field, Plain, Selecting
 from berteam_cli.selector.berteam_state import BerteamState, restored
 from berteam_cli.selector.best_response import best_response_loss
 from berteam_cli.selector.captains import SCHEMES
@@ -21,7 +21,7 @@ from berteam_cli.selector.embedders import Embedder, embedder
 from berteam_cli.selector.masking import masking_loss
 from berteam_cli.selector.network import LONGEST, POSITIONS, TeamNetwork, seeded
 from berteam_cli.selector.observations import Looking, Seen, nothing_seen, seen_in
-from berteam_cli.selector.updates import untrained, updated
+from berteam_cli.selector.updates import check_minibatches, untrained, updated
 from berteam_cli.selector.winners import Examples, Winners, harvest, in_parts, minibatch, no_winners, pushed
 
 CPU = torch.device("cpu")
@@ -31,7 +31,7 @@ KNOWING = ("shared", "token", "separate")  # how a side that is chosen for is to
 
 
 @dataclass(frozen=True, eq=False)  # a field's arrays have no truth value
-class BerteamLearning:
+class BerteamLearning(Plain):
     """Settings of BERTeam, and how it learns.
 
     Attributes:
@@ -109,11 +109,7 @@ class BerteamLearning:
             )
         if self.loss == "l1" and not self.weighting:
             raise ValueError("selector.loss=l1 needs selector.weighting=true: else it finds what was chosen often.")
-        if self.batch_size % self.minibatch_size:
-            raise ValueError(
-                f"selector.minibatch_size must divide selector.batch_size, "
-                f"but {self.minibatch_size} does not divide {self.batch_size}."
-            )
+        check_minibatches(self.batch_size, self.minibatch_size)
         if self.width % self.heads or self.width % 2:
             raise ValueError(
                 f"selector.width must be even and a multiple of selector.heads, {self.heads}, but is {self.width}."

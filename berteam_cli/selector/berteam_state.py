@@ -7,10 +7,10 @@ from typing import Any
 
 import torch
 
+from berteam_cli.selector import updates
 from berteam_cli.selector.updates import Learnt
 from berteam_cli.selector.winners import Examples, Winners
-
-KINDS = ("weights", "means", "squares", "averages")  # of tensors in Learnt
+from berteam_cli.tensors import below
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,7 @@ class BerteamState:
         """Returns all of it as named tensors, without copies."""
         named: dict[str, Any] = {"epochs": torch.tensor(self.epochs)}
         for k, learnt in enumerate(self.learnt):
-            for kind in KINDS:
-                named |= {f"learnt.{k}.{kind}.{name}": value for name, value in getattr(learnt, kind).items()}
-            named[f"learnt.{k}.steps"] = torch.tensor(learnt.steps)
+            named |= {f"learnt.{k}.{name}": value for name, value in learnt.tensors().items()}
         for k, ring in enumerate(self.winners):
             named |= {f"winners.{k}.{x.name}": torch.from_numpy(getattr(ring.held, x.name)) for x in fields(Examples)}
             named[f"winners.{k}.pushed"] = torch.tensor(ring.pushed)
@@ -45,14 +43,8 @@ def restored(tensors: dict[str, Any], device: str) -> BerteamState:
     learnt: list[Learnt] = []
     rings: list[Winners] = []
     while part := below(tensors, f"learnt.{len(learnt)}."):
-        kinds = {kind: {name: x.to(device) for name, x in below(part, f"{kind}.").items()} for kind in KINDS}
-        learnt.append(Learnt(**kinds, steps=int(part["steps"])))
+        learnt.append(updates.restored(part, device))
     while part := below(tensors, f"winners.{len(rings)}."):
         held = Examples(*(part[x.name].cpu().numpy() for x in fields(Examples)))
         rings.append(Winners(held, int(part["pushed"])))
     return BerteamState(tuple(learnt), tuple(rings), int(tensors["epochs"]))
-
-
-def below(named: dict[str, Any], prefix: str) -> dict[str, Any]:
-    """Returns what has a name that begins with ``prefix``, without it."""
-    return {name.removeprefix(prefix): value for name, value in named.items() if name.startswith(prefix)}

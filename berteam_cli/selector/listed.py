@@ -196,7 +196,7 @@ def every_team(field: Field, limit: int) -> Ints | None:
         return None
     standing = np.stack(np.meshgrid(*(np.flatnonzero(row) for row in allowed), indexing="ij"), axis=-1)
     teams = standing.reshape(-1, size)
-    _, first = np.unique(np.sort(teams, axis=1), axis=0, return_index=True)
+    first = distinct(teams)
     return teams[first] if len(first) <= limit else None
 
 
@@ -210,6 +210,10 @@ def fresh(field: Field, count: int, taken: Ints, rng: Generator) -> Ints:
 
 def new_among(teams: Ints, count: int, taken: Ints) -> Ints:
     """Returns the first ``count`` of ``teams``, (J, T), that differ from those before and from those ``taken``."""
-    _, first = np.unique(np.sort(teams, axis=1), axis=0, return_index=True)
-    distinct = teams[np.sort(first)]
-    return distinct[places_of(distinct, taken) < 0][:count]
+    found = teams[np.sort(distinct(teams))]
+    return found[places_of(found, taken) < 0][:count]
+
+
+def distinct(teams: Ints) -> Ints:
+    """Returns the first row of each of the different ``teams``, (J, T), in lexicographic order of their members."""
+    return np.unique(np.sort(teams, axis=1), axis=0, return_index=True)[1]

@@ -96,10 +96,12 @@ class Mcaa(Plain):
         shares s: logits += eta J (q - s), with J = diag(s) - s s^T the Jacobian of the softmax.
         """
         state = replace(self._counted(state, outcomes), epochs=state.epochs + 1)
+        teams = len(state.tally) if state.tally is not None else int(state.wins.sum()) // self.field.team_size
+        if state.epochs % self.train_every:
+            return state, Selecting(buffer=teams)
         members = state.wins if state.tally is None else self._of_the_best(state.tally, len(state.logits))
-        if state.epochs % self.train_every or not members.any():
-            teams = len(state.tally) if state.tally is not None else int(state.wins.sum()) // self.field.team_size
-            return state, Selecting(buffer=teams, skipped=int(state.epochs % self.train_every == 0))
+        if not members.any():
+            return state, Selecting(buffer=teams, skipped=1)
         shares = state.shares
         error = members / members.sum() - shares
         step = shares * (error - shares @ error)

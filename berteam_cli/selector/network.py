@@ -19,6 +19,7 @@ from berteam_cli.selector.embedders import Embedder
 from berteam_cli.selector.filling import Odds
 from berteam_cli.selector.layers import Dropout, decoded, encoded, sinusoids
 from berteam_cli.selector.observations import Seen
+from berteam_cli.tensors import below
 
 POSITIONS = ("append", "add", "none")  # how a token learns its place in the team
 LONGEST = 512  # T; BERT's
@@ -190,7 +191,7 @@ def odds_of(network: TeamNetwork, weights: dict[str, Tensor], sides: Ints, seen:
         seen: (U,) what the members saw; None for nothing.
     """
     device = next(iter(weights.values())).device
-    reading, writing = part_of(weights, "reader."), part_of(weights, "writer.")
+    reading, writing = below(weights, "reader."), below(weights, "writer.")
     network.eval()
     with torch.inference_mode():
         known = (sides, None, None) if seen is None else (sides, seen.rows, seen.lengths)
@@ -235,8 +236,3 @@ def by_owner(own: Sequence[Odds], owner: Ints) -> Odds:
         return chances
 
     return odds
-
-
-def part_of(weights: dict[str, Tensor], prefix: str) -> dict[str, Tensor]:
-    """Returns the weights whose names begin with ``prefix``, without it."""
-    return {name.removeprefix(prefix): value for name, value in weights.items() if name.startswith(prefix)}

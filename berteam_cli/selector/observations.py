@@ -14,21 +14,14 @@ from berteam_cli.outcomes import Experience, Ints
 LARGEST = float(np.finfo(np.float16).max)
 
 
-USES = ("none", "self", "previous_game")
-"""What is known of the opponent when a team is chosen, and learnt with it.
-
-"none": nothing. "self": winners are learnt together with what their own members saw while they won, as in the paper;
-teams are chosen without. "previous_game": every second game of an epoch is against the opponents of the one before, and
-the team for it is chosen on what was seen there.
-"""
-
-
 @dataclass(frozen=True)
 class Looking:
     """What of the opponent is known before a team is chosen.
 
     Attributes:
-        use: one of USES.
+        use: "none"; "self", winners are learnt together with what their own members saw while they won, as in the
+            paper, and teams are chosen without; or "previous_game", every second game of an epoch is against the
+            opponents of the one before, and the team for it is chosen on what was seen there.
         stride: steps from one observation that is kept to the next.
         drop_input: chance of an example to be learnt as if nothing had been seen.
         drop_player: chance of each member to be learnt as if it had seen nothing.

@@ -13,6 +13,9 @@ from torch import Tensor, nn
 from torch.func import functional_call
 
 from berteam_cli.selector.network import seeded
+from berteam_cli.tensors import below
+
+KINDS = ("weights", "means", "squares", "averages")  # of tensors in Learnt
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,17 @@ class Learnt:
         """What teams are chosen with: the averages, or the newest parameters where none are kept."""
         return self.averages or self.weights
 
+    def tensors(self) -> dict[str, Tensor]:
+        """Returns all of it as named tensors, without copies."""
+        named = {f"{kind}.{name}": value for kind in KINDS for name, value in getattr(self, kind).items()}
+        return named | {"steps": torch.tensor(self.steps)}
+
+
+def restored(tensors: dict[str, Tensor], device: str) -> Learnt:
+    """Returns what gave ``tensors``, on ``device``."""
+    kinds = {kind: {name: x.to(device) for name, x in below(tensors, f"{kind}.").items()} for kind in KINDS}
+    return Learnt(**kinds, steps=int(tensors["steps"]))
+
 
 def untrained(network: nn.Module, device: torch.device) -> Learnt:
     """Returns the weights of ``network`` on ``device`` before the first step."""
@@ -45,6 +59,19 @@ def untrained(network: nn.Module, device: torch.device) -> Learnt:
     means = {name: torch.zeros_like(value) for name, value in weights.items()}
     squares = {name: torch.zeros_like(value) for name, value in weights.items()}
     return Learnt(weights, means, squares, 0, {})
+
+
+def check_minibatches(batch_size: int, minibatch_size: int) -> None:
+    """Checks that the minibatches of an update are of one size.
+
+    Raises:
+        ValueError: they are not.
+    """
+    if batch_size % minibatch_size:
+        raise ValueError(
+            f"selector.minibatch_size must divide selector.batch_size, "
+            f"but {minibatch_size} does not divide {batch_size}."
+        )
 
 
 Loss = Callable[[Callable[..., Tensor], Any, Generator], Tensor]
