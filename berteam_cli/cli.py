@@ -27,6 +27,7 @@ WORDS = {
     "replay": "one game as a page for the browser or as a GIF",
     "export": "a member as a file that Stable-Baselines3 loads",
     "evaluate": "where choosing among a run's teams ends in theory, and who is alike",
+    "report": "runs as one page to read, with a picture of each plot",
     "inspect": "the tables of a run in the terminal",
     "list": "what can be chosen",
 }
@@ -71,7 +72,7 @@ def run(word: str, words: list[str]) -> None:
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
     commands = {"train": composed, "tournament": composed, "replay": replay}
-    commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing, "evaluate": evaluate}
+    commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing, "evaluate": evaluate, "report": report}
     commands[word](word, words)
 
 
@@ -91,7 +92,7 @@ def composed(word: str, words: list[str]) -> None:
     if not (given.hydra_help or given.shell_completion):
         check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
     sys.argv = [f"berteam {word}", *words]
-    task = {"train": train_task, "tournament": tournament_task, "replay": replay_task}[word]
+    task = {"train": train_task, "tournament": tournament_task, "replay": replay_task, "report": report_task}[word]
     hydra.main(version_base="1.3", config_path="pkg://berteam_cli.conf", config_name=word)(task)()
     if given.multirun and Sweeps.failed:
         raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
@@ -113,6 +114,10 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
         from berteam_cli.command import tournament  # noqa: PLC0415
 
         tournament.players(config, keys)
+    elif word == "report":
+        from berteam_cli.command import report  # noqa: PLC0415
+
+        report.read(config)
     else:
         from berteam_cli.command import replay  # noqa: PLC0415
 
@@ -145,6 +150,13 @@ def replay_task(cfg: DictConfig) -> float:
     from berteam_cli.command.replay import replay as film  # noqa: PLC0415
 
     return perform(lambda config, _, out: film(config, out), cfg)
+
+
+def report_task(cfg: DictConfig) -> float:
+    """Writes a report; what Hydra calls. Returns NaN as ``tournament_task``."""
+    from berteam_cli.command.report import report as tell  # noqa: PLC0415
+
+    return perform(lambda config, _, out: tell(config, out), cfg)
 
 
 def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) -> float:
@@ -222,6 +234,22 @@ def replay(word: str, words: list[str]) -> None:
     if {"-m", "--multirun"} & set(words):
         raise InputError("replay films one game, so it takes no --multirun.")
     composed(word, words)
+
+
+def report(word: str, words: list[str]) -> None:
+    """Reports runs; the words that are no override and no flag are their folders.
+
+    Raises:
+        InputError: runs are named in two ways, or several reports are asked for.
+    """
+    folders = [x for x in words if not x.startswith("-") and ("=" not in x or Path(x).is_dir())]
+    rest = [x for x in words if x not in folders]
+    if folders and any(x.startswith("runs=") for x in rest):
+        raise InputError(f"The runs are named twice: {folders[0]} and runs=.")
+    if {"-m", "--multirun"} & set(words):
+        raise InputError("report takes several runs at once, so it takes no --multirun.")
+    quoted = ",".join("'{}'".format(x.replace("'", "\\'")) for x in folders)
+    composed(word, [f"runs=[{quoted}]", *rest] if folders else rest)
 
 
 def export(word: str, words: list[str]) -> None:

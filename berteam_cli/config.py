@@ -444,6 +444,16 @@ class ReplayConfig:
     env: EnvConfig = MISSING
 
 
+@dataclass
+class ReportConfig:
+    """Settings of ``berteam report``."""
+
+    runs: list[str] = MISSING
+    out: str | None = MISSING
+    on_exists: str = choice("error", "overwrite")
+    seed: int = number(0, 2**63 - 1)
+
+
 SCHEMAS: dict[str, dict[str, type]] = {
     "env": {"mctf": MctfConfig, "rps": RpsConfig, "pettingzoo": PettingzooConfig},
     "selector": {
@@ -459,7 +469,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
     "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig, "sb3": Sb3Config},
     "population": {"islands": PopulationConfig},
     "evaluation": {"truth": EvaluationConfig},
-    "command": {"train": TrainConfig, "tournament": TournamentConfig, "replay": ReplayConfig},
+    "command": {"train": TrainConfig, "tournament": TournamentConfig, "replay": ReplayConfig, "report": ReportConfig},
 }
 
 
