@@ -72,7 +72,14 @@ def run(word: str, words: list[str]) -> None:
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
     commands = {"train": composed, "tournament": composed, "replay": replay}
-    commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing, "evaluate": evaluate, "report": report}
+    commands |= {
+        "resume": resume,
+        "inspect": inspect,
+        "export": export,
+        "list": listing,
+        "evaluate": evaluate,
+        "report": report,
+    }
     commands[word](word, words)
 
 

@@ -55,7 +55,9 @@ def whole_lines(text: bytes) -> int:
     if not text.endswith(b"\n"):
         return text.rfind(b"\n") + 1
     begin = text.rfind(b"\n", 0, len(text) - 1) + 1
-    first, last = (next(csv.reader([line.decode(errors="replace")]), []) for line in (text.partition(b"\n")[0], text[begin:]))
+    first, last = (
+        next(csv.reader([line.decode(errors="replace")]), []) for line in (text.partition(b"\n")[0], text[begin:])
+    )
     return begin if len(last) < len(first) and b'"' not in text[begin:] else len(text)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from berteam_cli.report.drawing import LIGHT, SERIES, Plot, drawn, kept, panels, short
+from berteam_cli.report.drawing import LIGHT, SERIES, Plot, drawn, kept, over_epochs, panels, short
 from berteam_cli.report.source import Source
 
 TOP = 10
@@ -77,13 +77,16 @@ def stacked(table: pd.DataFrame, key: str, names: dict, name: str, title: str, s
     if len(epochs) > 1:
         plot.stackplot(epochs, heights, labels=labels, colors=colors, linewidth=0.4, edgecolor=LIGHT["card"])
         plot.set_xlim(epochs[0], epochs[-1])
+        over_epochs(plot)
     else:
         foot = 0.0
         for height, label, color in zip(heights, labels, colors, strict=True):
             plot.bar([str(epochs[0])], height, bottom=foot, label=label, color=color, width=0.4)
             foot += float(height[0])
-    plot.set(xlabel="epoch", ylabel=axis, ylim=(0, 1))
+    plot.set(ylabel=axis, ylim=(0, 1))
     plot.grid(visible=False)
     figure.legend(loc="outside lower left", ncols=2 if max(map(len, labels)) > 16 else 4)
     likeliest = f"{labels[0]} with {heights[0][-1]:.0%}" if labels else "nobody"
-    return drawn(figure, name, title, says, f"{axis}, stacked over {len(epochs)} records; at the end first {likeliest}.")
+    return drawn(
+        figure, name, title, says, f"{axis}, stacked over {len(epochs)} records; at the end first {likeliest}."
+    )

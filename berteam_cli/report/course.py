@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from berteam_cli.report.drawing import SERIES, Plot, binned, drawn, panels, pooled, short
+from berteam_cli.report.drawing import SERIES, Plot, binned, drawn, over_epochs, panels, pooled, short
 from berteam_cli.report.source import Source
 
 LEARNING = {
@@ -51,7 +51,7 @@ def learning(source: Source) -> Plot:
                 plot.plot(x[known], values[known], color=SERIES[k % len(SERIES)], linewidth=1.3, label=short(algorithm))
     for plot, column in zip(plots, there, strict=True):
         plot.set_title(LEARNING[column])
-    plots[-1].set_xlabel("epoch")
+    over_epochs(plots[-1])
     legend = dict(zip(*plots[0].get_legend_handles_labels()[::-1], strict=True))
     figure.legend(legend.values(), legend.keys(), loc="outside lower left", ncols=4)
     says = (
@@ -75,7 +75,7 @@ def selecting(source: Source) -> Plot:
         plot.plot(x, y[:, 0], color=SERIES[k], linewidth=1.3, marker="o" if len(x) == 1 else None)
         plot.set_title(SELECTOR[column])
         plot.set_ylim(bottom=0 if (y >= 0).all() and column != "loss" else None)
-    plots[-1].set_xlabel("epoch")
+    over_epochs(plots[-1])
     says = (
         "Effective teams: as spread out as equal chances for so many. Exploitability: what the best answer wins on "
         "average. A buffer that stays empty means there were no winners to learn from." + pooled(len(table))
@@ -93,19 +93,22 @@ def timing(source: Source) -> Plot:
     x, y = binned(table.epoch.to_numpy(), table[list(PARTS)].fillna(0).to_numpy(float), 200)
     figure, (plot,) = panels()
     if len(x) > 1:
-        labels = [f"{said} ({table[part].sum() / max(table[[*PARTS]].sum().sum(), 1e-12):.0%})" for part, said in PARTS.items()]
+        whole = max(table[list(PARTS)].sum().sum(), 1e-12)
+        labels = [f"{said} ({table[part].sum() / whole:.0%})" for part, said in PARTS.items()]
         plot.stackplot(x, y.T, labels=labels, colors=SERIES[: len(PARTS)])
         plot.set_xlim(x[0], x[-1])
+        over_epochs(plot)
     else:
         plot.bar(list(PARTS.values()), y[0], color=SERIES[0])
         plot.tick_params(axis="x", rotation=30)
-    plot.set(xlabel="epoch", ylabel="seconds an epoch")
-    highest = float(np.quantile(y.sum(axis=1), 0.99)) if len(y) > 20 else float(y.sum(axis=1).max())
-    plot.set_ylim(0, 1.15 * highest if highest > 0 else None)
+    plot.set_ylabel("seconds an epoch")
+    highest = float(y[len(y) > 2 :].sum(axis=1).max())
+    plot.set_ylim(0, 1.1 * highest if highest > 0 else None)
     figure.legend(loc="outside lower left", ncols=3)
     total = table[list(PARTS)].sum(axis=1)
     says = (
-        f"{total.sum():,.0f} s in all, {total.median():.3g} s in the median epoch; single long epochs may be cut off. "
-        "Seconds depend on the machine and on who else used it; the evaluation at the end is not among them."
+        f"{total.sum():,.0f} s in all, {total.median():.3g} s in the median epoch; the first epoch, in which kernels are "
+        "loaded, may be cut off. Seconds depend on the machine and on who else used it; the evaluation at the end is "
+        "not among them."
     )
     return drawn(figure, name, title, says, f"Seconds an epoch by part; {total.median():.3g} in the median epoch.")

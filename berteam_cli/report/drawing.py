@@ -28,9 +28,7 @@ SERIES = ("#0072b2", "#e69f00", "#009e73", "#d55e00", "#56b4e9", "#cc79a7", "#f0
 SERIES_DARK = (
     *("#3d9bdc", "#f0b429", "#22b98c", "#ef7a35", "#7cc9f5", "#dc96bf", "#efe66a", "#b8823f", "#9a8de0", "#5fb878"),
 )
-THEMED = {LIGHT[name]: f"var(--{name})" for name in LIGHT} | {
-    color: f"var(--s{k})" for k, color in enumerate(SERIES)
-}
+THEMED = {LIGHT[name]: f"var(--{name})" for name in LIGHT} | {color: f"var(--s{k})" for k, color in enumerate(SERIES)}
 WIDTH_IN, HEIGHT_IN, DPI = 6.6, 3.7, 170
 POINTS = 400
 """A curve has no more: as many as its plot has pixels to show."""
@@ -113,6 +111,12 @@ def panels(rows: int = 1, height_in: float = HEIGHT_IN) -> tuple[Figure, list[Ax
 
     figure = Blank(figsize=(WIDTH_IN, height_in), layout="constrained")
     return figure, list(figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0])
+
+
+def over_epochs(plot: Axes) -> None:
+    """Makes the horizontal axis of a plot that of epochs, which are whole numbers."""
+    plot.set_xlabel("epoch")
+    plot.xaxis.get_major_locator().set_params(integer=True)
 
 
 def drawn(figure: Figure, name: str, title: str, says: str, alt: str) -> Plot:

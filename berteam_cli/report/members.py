@@ -7,11 +7,12 @@ import pandas as pd
 
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.outcomes import Floats
-from berteam_cli.report.drawing import LIGHT, SERIES, Plot, drawn, kept, panels, short
+from berteam_cli.report.drawing import LIGHT, SERIES, Plot, drawn, kept, over_epochs, panels, short
 from berteam_cli.report.source import Source
 
 LINES, ON_A_LINE = 60, 150
 MARKS = 1500
+BIN = 0.125
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
@@ -24,13 +25,9 @@ def aggression(source: Source) -> Plot:
         return Plot(name, title, says)
     figure, (plot,) = panels(height_in=3.0)
     groups = {"defensive (below 1)": values[values < 1], "aggressive (1 and above)": values[values >= 1]}
-    width = max(values.max(), 1.2) / 24
+    bins = np.arange(0, max(values.max(), 1.0) + 2 * BIN, BIN)  # 1 is the border of two of them
     for (label, group), color in zip(groups.items(), SERIES[:2], strict=True):
-        bins = np.arange(0 if group is groups["defensive (below 1)"] else 1, values.max() + width, width)
-        if len(group):
-            bins = bins[bins <= 1 + 1e-9] if label.startswith("def") else bins
-            bins = np.append(bins, 1.0) if label.startswith("def") and bins[-1] < 1 else bins
-            plot.hist(group, bins=bins, color=color, label=f"{label}: {len(group)}", edgecolor=LIGHT["card"])
+        plot.hist(group, bins=bins, color=color, label=f"{label}: {len(group)}", edgecolor=LIGHT["card"])
     plot.axvline(1, color=LIGHT["pale"], linewidth=1, linestyle=":")
     plot.set(xlabel="aggression (0 keeps home, 1 between, above attacks)", ylabel="members")
     plot.yaxis.get_major_locator().set_params(integer=True)
@@ -74,7 +71,8 @@ def fitness(source: Source) -> Plot:
             **{"color": SERIES[3], "markersize": 4, "alpha": 0.7, "label": f"replaced ({len(replaced):,})"},
         )
     scores = wide.max().max() <= 1
-    plot.set(xlabel="epoch", ylabel="fitness (mean score)" if scores else "fitness (Elo points)")
+    over_epochs(plot)
+    plot.set(ylabel="fitness (mean score)" if scores else "fitness (Elo points)")
     figure.legend(loc="outside lower left", ncols=3)
     says = (
         f"{len(some)} of {wide.shape[1]} members each as a faint line. Fitness is relative: it says who is fitter "

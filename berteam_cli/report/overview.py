@@ -79,7 +79,7 @@ def spread(value: float, low: float, high: float) -> str:
     """Returns a figure and its interval as they are read."""
     if not isinstance(value, int | float) or math.isnan(value):
         return "unknown" if not isinstance(value, str) else value
-    digits = 1 if abs(value) >= 100 else 3
+    digits = 0 if abs(value) >= 100 else 3
     if math.isnan(low) or math.isnan(high):
         return f"{value:,.{digits}f}"
     return f"{value:,.{digits}f} ({low:,.{digits}f} to {high:,.{digits}f})"

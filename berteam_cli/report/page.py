@@ -124,12 +124,12 @@ def of_run(section: Section, *, several: bool) -> str:
     heading = f"<h2>{escape(str(source.folder))}</h2>" if several else "<h2>In short</h2>"
     command = " ".join(map(str, source.manifest["command"]))
     made = f"<p>Made by <code>{escape(command)}</code>, started {escape(str(source.manifest['started']))}.</p>"
-    plots = "".join(plotted(section.key, plot) for plot in section.plots)
+    plots = "".join(plotted(section.key, plot) for plot in section.plots if plot.svg)
     facts = escape(json.dumps(source.manifest, indent=1, ensure_ascii=False))
     config = escape(source.config or "There is no config.yaml in the folder.")
     return (
         f'<section id="{key}">{heading}{remark}<dl class="figures">{figures}</dl>{made}'
-        f'<div class="plots">{plots}</div>{watched(section)}'
+        f'<div class="plots">{plots}</div>{watched(section)}{absent(section)}'
         f'<div id="{key}-config"><h3>Config and manifest</h3>'
         f"<details><summary>config.yaml: every value of the run</summary><pre>{config}</pre></details>"
         f"<details><summary>manifest.json: versions, seed, times</summary><pre>{facts}</pre></details></div></section>"
@@ -137,10 +137,8 @@ def of_run(section: Section, *, several: bool) -> str:
 
 
 def plotted(key: str, plot: Plot) -> str:
-    """Returns a plot with its heading and what it says, or only why there is none."""
+    """Returns a plot with its heading and what it says."""
     name, title, says = escape(f"{key}-{plot.name}"), escape(plot.title), spoken(plot.says)
-    if not plot.svg:
-        return f'<div class="plot absent" id="{name}"><h3>{title}</h3><p>{says}</p></div>'
     drawing = plot.svg.replace("<svg ", f'<svg role="img" aria-label="{escape(plot.alt)}" ', 1)
     for mark in ("url(#", 'href="#', ' id="'):  # the same plot of another run is on the page too
         drawing = drawing.replace(f"{mark}{plot.name}-", f"{mark}{name}-")
@@ -149,6 +147,16 @@ def plotted(key: str, plot: Plot) -> str:
         f'<div class="wide" tabindex="0" role="group" aria-label="{title}">{drawing}</div>'
         f"<figcaption>{says}</figcaption></figure>"
     )
+
+
+def absent(section: Section) -> str:
+    """Returns what could not be drawn, and which command helps."""
+    missing = [plot for plot in section.plots if not plot.svg]
+    items = "".join(
+        f'<li id="{escape(f"{section.key}-{plot.name}")}"><strong>{escape(plot.title)}</strong> {spoken(plot.says)}</li>'
+        for plot in missing
+    )
+    return f'<div class="absent"><h3>What is not here</h3><ul>{items}</ul></div>' if missing else ""
 
 
 def watched(section: Section) -> str:

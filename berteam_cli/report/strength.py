@@ -53,6 +53,8 @@ def against_probability(source: Source) -> Plot:
     ends = np.array([elo.min(), elo.max()])
     plot.plot(ends, 10 ** (foot + slope * ends), color=SERIES[3], linewidth=1.8)
     plot.set(xlabel="Elo", ylabel="probability", yscale="log")
+    plot.yaxis.set_major_formatter("{x:g}")
+    plot.yaxis.set_minor_formatter("")
     fit = f"log10 P rises by {400 * slope:.2f} in 400 Elo; R² = {explained:.2f}"
     plot.set_title(fit, color=SERIES[3])
     says = (
