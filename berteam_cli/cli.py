@@ -114,8 +114,10 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
     from berteam_cli import build  # noqa: PLC0415
 
     if word == "train":
+        from berteam_cli.logger.opening import check_logger  # noqa: PLC0415
         from berteam_cli.stored import goes_on  # noqa: PLC0415
 
+        check_logger(config.logger)
         build.parts(config, stored=goes_on(config, Path(config.out) if config.out else None))
     elif word == "tournament":
         from berteam_cli.command import tournament  # noqa: PLC0415

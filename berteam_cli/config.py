@@ -391,6 +391,29 @@ class EvaluationConfig:
 
 
 @dataclass
+class LoggerConfig:
+    """Where the figures of an epoch go beside the tables; logger/."""
+
+    name: str = MISSING
+
+
+@dataclass
+class WandbConfig(LoggerConfig):
+    """Settings of logger/wandb.py."""
+
+    project: str = MISSING
+    mode: str = choice("offline", "online")
+
+
+@dataclass
+class MlflowConfig(LoggerConfig):
+    """Settings of logger/mlflow.py."""
+
+    experiment: str = MISSING
+    tracking: str | None = MISSING
+
+
+@dataclass
 class CommandConfig:
     """What every command that writes a folder has."""
 
@@ -417,6 +440,7 @@ class TrainConfig(CommandConfig):
     population: PopulationConfig = MISSING
     learner: LearnerConfig = MISSING
     evaluation: EvaluationConfig = MISSING
+    logger: LoggerConfig = MISSING
 
 
 @dataclass
@@ -469,6 +493,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
     "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig, "sb3": Sb3Config},
     "population": {"islands": PopulationConfig},
     "evaluation": {"truth": EvaluationConfig},
+    "logger": {"csv": LoggerConfig, "tensorboard": LoggerConfig, "wandb": WandbConfig, "mlflow": MlflowConfig},
     "command": {"train": TrainConfig, "tournament": TournamentConfig, "replay": ReplayConfig, "report": ReportConfig},
 }
 

@@ -47,7 +47,8 @@ def claim(folder: Path, on_exists: str) -> None:
         for name in (*(f"{table}.csv" for table in COLUMNS), MANIFEST, CONFIG, LOG, ERROR):
             for place in (folder, folder / EVALUATION):
                 (place / name).unlink(missing_ok=True)
-        shutil.rmtree(folder / "checkpoint", ignore_errors=True)
+        for name in ("checkpoint", "tensorboard"):
+            shutil.rmtree(folder / name, ignore_errors=True)
     made = missing(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)

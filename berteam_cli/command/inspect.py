@@ -51,7 +51,7 @@ def read_table(
 
 
 def whole_lines(text: bytes) -> int:
-    """Returns how many bytes of a table are whole lines: the last one must have an end, and as many cells as the first."""
+    """Returns how many bytes of a table are whole lines: its last must have an end and as many cells as its first."""
     if not text.endswith(b"\n"):
         return text.rfind(b"\n") + 1
     begin = text.rfind(b"\n", 0, len(text) - 1) + 1

@@ -152,10 +152,8 @@ def plotted(key: str, plot: Plot) -> str:
 def absent(section: Section) -> str:
     """Returns what could not be drawn, and which command helps."""
     missing = [plot for plot in section.plots if not plot.svg]
-    items = "".join(
-        f'<li id="{escape(f"{section.key}-{plot.name}")}"><strong>{escape(plot.title)}</strong> {spoken(plot.says)}</li>'
-        for plot in missing
-    )
+    told = ((escape(f"{section.key}-{x.name}"), escape(x.title), spoken(x.says)) for x in missing)
+    items = "".join(f'<li id="{name}"><strong>{title}</strong>: {says}</li>' for name, title, says in told)
     return f'<div class="absent"><h3>What is not here</h3><ul>{items}</ul></div>' if missing else ""
 
 
