@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -31,6 +32,8 @@ class Mlflow:
         from mlflow import MlflowClient  # noqa: PLC0415 (an extra)
         from mlflow.entities import Param  # noqa: PLC0415
 
+        if tracking is None:
+            os.environ.setdefault("MLFLOW_ALLOW_FILE_STORE", "true")  # MLflow 3 takes files only when asked twice
         self.client = MlflowClient(tracking_uri=tracking or (folder / FOLDER).absolute().as_uri())
         found = self.client.get_experiment_by_name(experiment)
         place = self.client.create_experiment(experiment) if found is None else found.experiment_id

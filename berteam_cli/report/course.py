@@ -107,8 +107,8 @@ def timing(source: Source) -> Plot:
     figure.legend(loc="outside lower left", ncols=3)
     total = table[list(PARTS)].sum(axis=1)
     says = (
-        f"{total.sum():,.0f} s in all, {total.median():.3g} s in the median epoch; the first, in which kernels are loaded, "
-        "may be cut off. Seconds depend on the machine and on who else used it; the evaluation at the end is "
+        f"{total.sum():,.0f} s in all, {total.median():.3g} s in the median epoch; the first, in which kernels are "
+        "loaded, may be cut off. Seconds depend on the machine and on who else used it; the evaluation at the end is "
         "not among them."
     )
     return drawn(figure, name, title, says, f"Seconds an epoch by part; {total.median():.3g} in the median epoch.")
