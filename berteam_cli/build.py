@@ -10,7 +10,8 @@ from typing import Any
 
 import torch
 
-from berteam_cli.config import CommandConfig, EnvConfig, OptimizerConfig, TrainConfig
+from berteam_cli.config_commands import CommandConfig, TrainConfig
+from berteam_cli.config_groups import EnvConfig, OptimizerConfig
 from berteam_cli.env.base import Env, blank_trajectories
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.pettingzoo import Pettingzoo

@@ -6,6 +6,8 @@ Exit codes: 0 done, 2 the input is wrong, 3 the run failed, 130 interrupted.
 from __future__ import annotations
 
 import argparse
+import importlib
+import itertools
 import os
 import sys
 from collections.abc import Callable
@@ -26,8 +28,10 @@ WORDS = {
     "tournament": "every team against every other",
     "replay": "one game as a page for the browser or as a GIF",
     "export": "a member as a file that Stable-Baselines3 loads",
-    "evaluate": "where choosing among a run's teams ends in theory, and who is alike",
-    "report": "runs as one page to read, with a picture of each plot",
+    "evaluate": "the true Elos of a run's teams, and what its selector knows of them",
+    "compare": "runs against each other and against the fixed teams",
+    "reproduce": "the paper's tables, beside its numbers",
+    "report": "runs as one page for the browser",
     "inspect": "the tables of a run in the terminal",
     "list": "what can be chosen",
 }
@@ -71,16 +75,9 @@ def run(word: str, words: list[str]) -> None:
     """
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
-    commands = {"train": composed, "tournament": composed, "replay": replay}
-    commands |= {
-        "resume": resume,
-        "inspect": inspect,
-        "export": export,
-        "list": listing,
-        "evaluate": evaluate,
-        "report": report,
-    }
-    commands[word](word, words)
+    commands = {"train": composed, "tournament": composed}
+    commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing}
+    commands.get(word, about)(word, words)
 
 
 def composed(word: str, words: list[str]) -> None:
@@ -99,7 +96,10 @@ def composed(word: str, words: list[str]) -> None:
     if not (given.hydra_help or given.shell_completion):
         check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
     sys.argv = [f"berteam {word}", *words]
-    task = {"train": train_task, "tournament": tournament_task, "replay": replay_task, "report": report_task}[word]
+
+    def task(cfg: DictConfig) -> float:
+        return perform(command_of(word), cfg)
+
     hydra.main(version_base="1.3", config_path="pkg://berteam_cli.conf", config_name=word)(task)()
     if given.multirun and Sweeps.failed:
         raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
@@ -123,14 +123,23 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
         from berteam_cli.command import tournament  # noqa: PLC0415
 
         tournament.players(config, keys)
+    elif word == "replay":
+        from berteam_cli.command import replay  # noqa: PLC0415
+
+        replay.players(config, keys)
     elif word == "report":
         from berteam_cli.command import report  # noqa: PLC0415
 
         report.read(config)
-    else:
-        from berteam_cli.command import replay  # noqa: PLC0415
 
-        replay.players(config, keys)
+
+def command_of(word: str) -> Callable[[Any, str, Path | None], float]:
+    """Returns the function of a command that Hydra composes: it takes a config, its yaml and ``out``.
+
+    It returns the figure that a sweeper looks for the best of, NaN where there is none.
+    """
+    module = importlib.import_module(f"berteam_cli.command.{word}")
+    return getattr(module, word)
 
 
 class Sweeps:
@@ -138,34 +147,6 @@ class Sweeps:
 
     failed = 0
     table: Path | None = None
-
-
-def train_task(cfg: DictConfig) -> float:
-    """Trains; what Hydra calls for each run. Returns the expected Elo, for sweepers that look for the best."""
-    from berteam_cli.command.train import train  # noqa: PLC0415
-
-    return perform(train, cfg)
-
-
-def tournament_task(cfg: DictConfig) -> float:
-    """Plays a tournament; what Hydra calls. Returns NaN: a tournament has no figure to look for the best of."""
-    from berteam_cli.command.tournament import play  # noqa: PLC0415
-
-    return perform(play, cfg)
-
-
-def replay_task(cfg: DictConfig) -> float:
-    """Films a game; what Hydra calls. Returns NaN as ``tournament_task``."""
-    from berteam_cli.command.replay import replay as film  # noqa: PLC0415
-
-    return perform(lambda config, _, out: film(config, out), cfg)
-
-
-def report_task(cfg: DictConfig) -> float:
-    """Writes a report; what Hydra calls. Returns NaN as ``tournament_task``."""
-    from berteam_cli.command.report import report as tell  # noqa: PLC0415
-
-    return perform(lambda config, _, out: tell(config, out), cfg)
 
 
 def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) -> float:
@@ -181,9 +162,10 @@ def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) 
     from berteam_cli.config import checked  # noqa: PLC0415
 
     config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
+    out = getattr(config, "out", None)
     if HydraConfig.get().mode != RunMode.MULTIRUN:
         try:
-            return command(config, text, Path(config.out) if config.out else None)
+            return command(config, text, Path(out) if out else None)
         except (InputError, RunError) as error:  # past Hydra, which would print a traceback
             refuse(error)
     folder = Path(HydraConfig.get().runtime.output_dir)
@@ -222,43 +204,38 @@ def resume(word: str, words: list[str]) -> None:
         word,
         words,
         run={"type": Path, "help": "folder of the run"},
-        overrides={"nargs": "*", "help": "epochs=N, workers=N, checkpoint_every=N, evaluation.games=N"},
+        overrides={"nargs": "*", "help": "epochs=N, workers=N, checkpoint_every=N, evaluation.games=N, logger=NAME"},
     )
     from berteam_cli.command.resume import resume as go_on  # noqa: PLC0415
 
     go_on(given.run, given.overrides)
 
 
-def replay(word: str, words: list[str]) -> None:
-    """Films a game; a first word that is no override and no flag is the folder of a run.
+LEADING = {"replay": "run", "evaluate": "run", "compare": "runs", "report": "runs", "reproduce": "what"}
+"""The key that the first words of a command stand for: folders of runs, and what is reproduced."""
+
+
+def about(word: str, words: list[str]) -> None:
+    """Runs a command whose first words, which are no overrides and no flags, say what it is about.
 
     Raises:
-        InputError: the run is named twice, or several games are asked for.
+        InputError: that is said twice, or missing, or a sweep is asked for.
     """
-    if words and not words[0].startswith("-") and ("=" not in words[0] or Path(words[0]).is_dir()):
-        if any(other.startswith("run=") for other in words[1:]):
-            raise InputError(f"The run is named twice: {words[0]} and run=.")
-        quoted = words[0].replace("'", "\\'")
-        words = [f"run='{quoted}'", *words[1:]]
+    key, several = LEADING[word], LEADING[word] == "runs"
+    named = list(itertools.takewhile(lambda x: not x.startswith("-") and ("=" not in x or Path(x).is_dir()), words))
+    named = named if several else named[:1]
+    rest = words[len(named) :]
+    if named and any(other.startswith(f"{key}=") for other in rest):
+        raise InputError(f"{'The run is' if key == 'run' else 'This is'} named twice: {named[0]} and {key}=.")
     if {"-m", "--multirun"} & set(words):
-        raise InputError("replay films one game, so it takes no --multirun.")
-    composed(word, words)
-
-
-def report(word: str, words: list[str]) -> None:
-    """Reports runs; the words that are no override and no flag are their folders.
-
-    Raises:
-        InputError: runs are named in two ways, or several reports are asked for.
-    """
-    folders = [x for x in words if not x.startswith("-") and ("=" not in x or Path(x).is_dir())]
-    rest = [x for x in words if x not in folders]
-    if folders and any(x.startswith("runs=") for x in rest):
-        raise InputError(f"The runs are named twice: {folders[0]} and runs=.")
-    if {"-m", "--multirun"} & set(words):
-        raise InputError("report takes several runs at once, so it takes no --multirun.")
-    quoted = ",".join("'{}'".format(x.replace("'", "\\'")) for x in folders)
-    composed(word, [f"runs=[{quoted}]", *rest] if folders else rest)
+        raise InputError(f"{word} does one thing at a time, so it takes no --multirun.")
+    asked = any(x.startswith(f"{key}=") for x in rest) or {"-h", "--help", "--cfg", "-c", "--info", "-i"} & set(rest)
+    if not (named or asked or word == "replay"):
+        raise InputError(f"berteam {word}: {key} must be given first; see berteam {word} --help.")
+    quoted = ["'" + x.replace("'", "\\'") + "'" for x in named]
+    if quoted:
+        rest = [f"{key}=[{','.join(quoted)}]" if several else f"{key}={quoted[0]}", *rest]
+    composed(word, rest)
 
 
 def export(word: str, words: list[str]) -> None:
@@ -287,24 +264,6 @@ def inspect(word: str, words: list[str]) -> None:
     from berteam_cli.command.inspect import inspect as look  # noqa: PLC0415
 
     look(given.run, given.top)
-
-
-def evaluate(word: str, words: list[str]) -> None:
-    """Compares a run with where choosing among its teams ends in theory, and members with each other."""
-    given = reader(
-        word,
-        words,
-        run={"type": Path, "help": "folder of the run"},
-        __top={"type": int, "default": 10, "help": "rows of each table (10)"},
-        __most={"type": int, "default": 300, "help": "so many teams at most play each other (300)"},
-        __games={"type": int, "default": 8, "help": "games of each two teams (8: all orders of teams of two)"},
-    )
-    for name, least in (("top", 1), ("most", 0), ("games", 1)):
-        if getattr(given, name) < least:
-            raise InputError(f"--{name} must be >= {least}, but is {getattr(given, name)}.")
-    from berteam_cli.command.evaluate import evaluate as compare  # noqa: PLC0415
-
-    compare(given.run, given.top, given.most, given.games)
 
 
 def listing(word: str, words: list[str]) -> None:

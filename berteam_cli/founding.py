@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from berteam_cli.acting import Policies, joined
-from berteam_cli.config import IslandConfig, LearnerConfig, MemberConfig, TrainConfig
+from berteam_cli.config_commands import TrainConfig
+from berteam_cli.config_groups import IslandConfig, LearnerConfig, MemberConfig
 from berteam_cli.env.base import Env
 from berteam_cli.errors import InputError
 from berteam_cli.learner.base import Learner

@@ -12,7 +12,9 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from berteam_cli.checkpoint import check_schema
-from berteam_cli.config import SCHEMAS, IslandConfig, TrainConfig
+from berteam_cli.config import SCHEMAS
+from berteam_cli.config_commands import TrainConfig
+from berteam_cli.config_groups import IslandConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import CONFIG
 

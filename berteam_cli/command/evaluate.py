@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.random import Generator
 from rich.console import Console
 
 from berteam_cli.command.inspect import printed
+from berteam_cli.config_commands import EvaluateConfig
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.conditioning import Encounters, encounters
@@ -44,30 +46,30 @@ PROBES, PROBE_TEAMS = 2, 28  # games against each of so many teams of fixed poli
 Tables = dict[str, list[tuple[Any, ...]]]
 
 
-def evaluate(folder: Path, top: int, most: int, games_per_pair: int) -> None:
-    """Writes and prints the reference points of the run in ``folder`` and the likeness of its members.
+def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
+    """Writes and prints the reference points of a run and the likeness of its members; returns NaN.
 
     Args:
-        folder: of a training run.
-        top: rows of each printed table.
-        most: above so many possible teams they do not play each other, and there are no reference points.
-        games_per_pair: games of each two teams.
+        config: checked.
+        text: the same as yaml.
+        out: nothing: the tables go into the run's folder.
 
     Raises:
         InputError: there is no such run, it has no checkpoint, or its folder cannot be written.
     """
+    folder = Path(config.run)
     parts, run = last_state(folder)
     console = Console(width=None if Console().is_terminal else 120)
     console.print(f"{folder} after epoch {run.epoch}", highlight=False)
     playing, looking, meeting = generator(parts.seed, PAYOFFS, run.epoch).spawn(3)
     tables: Tables = {}
-    learned = learned_mix(run, parts, most, playing)
+    learned = learned_mix(run, parts, config.most, playing)
     if isinstance(learned, str):
         console.print(f"{learned}, so there are no reference points.", highlight=False)
     else:
-        points = reference_points(run, parts, learned, games_per_pair, playing)
+        points = reference_points(run, parts, learned, config.payoff_games, playing)
         tables["reference_points"] = point_rows(run, parts, points)
-        show_points(console, tables["reference_points"], points, top)
+        show_points(console, tables["reference_points"], points, config.top)
     if isinstance(parts.selector, Embedding):
         tables |= likeness(run, parts, looking)
         rows = [row[1:] for row in tables["embeddings"]]
@@ -83,6 +85,7 @@ def evaluate(folder: Path, top: int, most: int, games_per_pair: int) -> None:
         console.print(printed(title, pd.DataFrame(rows, columns=COLUMNS["conditioning"][1:])))
     for path in written(folder / EVALUATION, tables):
         console.print(str(path), highlight=False, soft_wrap=True)
+    return math.nan
 
 
 def written(place: Path, tables: Tables) -> list[Path]:
@@ -133,7 +136,7 @@ def learned_mix(run: Run, parts: Parts, most: int, rng: Generator) -> TeamDistri
     if field.sides != 2:
         return f"Games of {field.sides} sides have no payoff matrix"
     if teams > most:
-        return f"{teams:,} possible teams are more than --most {most:,}"
+        return f"{teams:,} possible teams are more than most={most:,}"
     learned = measured(parts.selector, run.selection, rng)
     if learned.samples:
         return "The teams are too many for an exact distribution (selector.exact_limit)"

@@ -12,7 +12,8 @@ import numpy as np
 from berteam_cli import build, checkpoint
 from berteam_cli.acting import Policies, fixed_policies
 from berteam_cli.command.inspect import read_table
-from berteam_cli.config import ReplayConfig, checked
+from berteam_cli.config import checked
+from berteam_cli.config_commands import ReplayConfig
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.folder import new_folder, read_manifest, write_whole
@@ -51,11 +52,12 @@ class Match:
     title: str
 
 
-def replay(config: ReplayConfig, out: Path | None) -> float:
+def replay(config: ReplayConfig, text: str, out: Path | None) -> float:
     """Plays a game and writes it as configured; returns NaN, having no figure to tell.
 
     Args:
         config: checked.
+        text: the same as yaml, which a film does not keep.
         out: file to write, with or without its ending; None has it beside the run.
 
     Raises:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from berteam_cli.config import ReportConfig
+from berteam_cli.config_commands import ReportConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import new_folder, write_whole
 from berteam_cli.report import chosen, course, members, overview, page, strength
@@ -21,7 +21,7 @@ PLOTS = (
 )
 
 
-def report(config: ReportConfig, out: Path | None) -> float:
+def report(config: ReportConfig, _: str, out: Path | None) -> float:
     """Writes the page of ``config.runs``; returns NaN, having no figure to tell.
 
     Args:
@@ -31,16 +31,16 @@ def report(config: ReportConfig, out: Path | None) -> float:
     Raises:
         InputError: matplotlib is missing, a folder is no run, a table cannot be read or the page is there already.
     """
-    sources, comparisons = read(config)
+    sources = read(config)
     folder = out or place(sources)
     if (folder / PAGE).exists() and config.on_exists != "overwrite":
         raise InputError(f"{folder / PAGE} exists already; name another folder with out=DIR, or on_exists=overwrite.")
     several = len(sources) > 1
     with styled():
         sections = [section(f"run{k}", source, config.seed) for k, source in enumerate(sources, start=1)]
-    tables = {said: table for comparison in comparisons for said, table in overview.compared(comparison).items()}
+    tables = {} if config.compare is None else overview.compared(Path(config.compare))
     rows = [overview.row_of(source) for source in sources] if several else []
-    title = f"{len(sources)} runs" if several else f"Run {sources[0].folder}" if sources else "A comparison of runs"
+    title = f"{len(sources)} runs" if several else f"Run {sources[0].folder}"
     text = page.html(Report(title, sections, rows, tables))
     for x in sections:
         for plot in x.plots:
@@ -52,11 +52,11 @@ def report(config: ReportConfig, out: Path | None) -> float:
     return math.nan
 
 
-def read(config: ReportConfig) -> tuple[list[Source], list[Path]]:
-    """Returns the runs, and the folders of comparisons among them.
+def read(config: ReportConfig) -> list[Source]:
+    """Returns the runs.
 
     Raises:
-        InputError: matplotlib is missing, or a folder is neither.
+        InputError: matplotlib is missing, a folder is no run, or ``config.compare`` is no comparison.
     """
     check_matplotlib()
     folders = [Path(run) for run in config.runs]
@@ -65,8 +65,9 @@ def read(config: ReportConfig) -> tuple[list[Source], list[Path]]:
     twice = sorted({str(x) for x in folders if sum(x.resolve() == y.resolve() for y in folders) > 1})
     if twice:
         raise InputError(f"The run {twice[0]} is named twice.")
-    comparisons = [folder for folder in folders if overview.is_comparison(folder)]
-    return [Source.of(folder) for folder in folders if folder not in comparisons], comparisons
+    if config.compare is not None and not overview.is_comparison(Path(config.compare)):
+        raise InputError(f"compare={config.compare} is no folder that berteam compare wrote: it has no comparison.csv.")
+    return [Source.of(folder) for folder in folders]
 
 
 def place(sources: list[Source]) -> Path:

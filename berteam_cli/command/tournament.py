@@ -15,10 +15,12 @@ from omegaconf import OmegaConf
 from berteam_cli import build, checkpoint
 from berteam_cli.acting import Policies, fixed_policies
 from berteam_cli.command.inspect import show
-from berteam_cli.config import TournamentConfig, checked
+from berteam_cli.config import checked
+from berteam_cli.config_commands import TournamentConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.reference import table_name
-from berteam_cli.evaluation.tournament import Standings, tournament
+from berteam_cli.evaluation.tournament import Standings
+from berteam_cli.evaluation.tournament import tournament as played
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder, read_manifest
 from berteam_cli.games import Games
 from berteam_cli.outcomes import SIDES, Ints
@@ -34,7 +36,7 @@ log = logging.getLogger("berteam")
 MOST_GAMES = 1_000_000  # some hours
 
 
-def play(config: TournamentConfig, text: str, folder: Path | None = None) -> float:
+def tournament(config: TournamentConfig, text: str, folder: Path | None = None) -> float:
     """Plays as configured and writes elo.csv, pairs.csv and games.csv; returns NaN, having no figure of its own.
 
     Args:
@@ -58,7 +60,7 @@ def play(config: TournamentConfig, text: str, folder: Path | None = None) -> flo
         manifest = Manifest.begun(folder, seed=config.seed, teams=len(entry.teams), pairs=pairs, **entry.facts)
         log.info("%d teams, %d pairs, %d games each.", len(entry.teams), pairs, config.games_per_pair)
         with manifest.until_the_end(resumable=False):
-            standings = tournament(entry.games, entry.policies, entry.teams, config.games_per_pair, config.seed)
+            standings = played(entry.games, entry.policies, entry.teams, config.games_per_pair, config.seed)
             write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, entry.names))
             write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
             write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))

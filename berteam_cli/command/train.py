@@ -11,7 +11,7 @@ from omegaconf import OmegaConf
 from berteam_cli import build, checkpoint
 from berteam_cli.checkpoint import Saved
 from berteam_cli.command.inspect import show
-from berteam_cli.config import TrainConfig
+from berteam_cli.config_commands import TrainConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.evaluation.exploiting import Exploiting

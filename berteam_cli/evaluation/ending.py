@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from berteam_cli.config import EvaluationConfig
+from berteam_cli.config_groups import EvaluationConfig
 from berteam_cli.evaluation.reference import Reference, reference, reference_teams
 from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
 from berteam_cli.folder import Manifest

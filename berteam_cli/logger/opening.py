@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from berteam_cli.config import LoggerConfig
+from berteam_cli.config_groups import LoggerConfig
 from berteam_cli.errors import InputError
 from berteam_cli.logger.base import Logger, Nowhere, Once
 from berteam_cli.training import Parts, Report, Run

@@ -28,7 +28,7 @@ class Replay:
 def best_game(source: Source, seed: int) -> Replay:
     """Returns a game of the run's strongest rated team against the second strongest."""
     from berteam_cli.command.replay import Match, checked_film, ending, of_run, played  # noqa: PLC0415 (torch)
-    from berteam_cli.config import ReplayConfig  # noqa: PLC0415
+    from berteam_cli.config_commands import ReplayConfig  # noqa: PLC0415
     from mctf.page import write_page  # noqa: PLC0415
 
     title = "A game of the best team"

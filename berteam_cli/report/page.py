@@ -119,7 +119,7 @@ def table(columns: list[str], rows: list[list[str]]) -> str:
 def of_run(section: Section, *, several: bool) -> str:
     """Returns the part of the page about a run."""
     source, key = section.source, escape(section.key)
-    remark = f'<p class="remark" role="note">{escape(source.remark)}</p>' if source.remark else ""
+    remark = f'<p class="remark" role="note">{spoken(source.remark)}</p>' if source.remark else ""
     figures = "".join(f"<div><dt>{escape(x)}</dt><dd>{escape(y)}</dd></div>" for x, y in section.figures.items())
     heading = f"<h2>{escape(str(source.folder))}</h2>" if several else "<h2>In short</h2>"
     command = " ".join(map(str, source.manifest["command"]))

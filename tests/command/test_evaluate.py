@@ -64,8 +64,8 @@ def test_reference_points_of_fixed_policies(berteam, tmp_path):
 def test_embeddings(berteam, tmp_path):
     words = ["population=islands4x3", *TINY, *SMALL_BERTEAM, "evaluation.games=0", "out=run"]
     berteam("train", *words)
-    said = berteam("evaluate", "run", "--most", "10").stdout
-    assert "78 possible teams are more than --most 10, so there are no reference points." in said
+    said = berteam("evaluate", "run", "most=10").stdout
+    assert "78 possible teams are more than most=10, so there are no reference points." in said
     assert not (tmp_path / "run" / "evaluation" / "reference_points.csv").exists()
     table, near = read(tmp_path / "run", "embeddings"), read(tmp_path / "run", "neighbours")
     assert tuple(table.columns) == COLUMNS["embeddings"]
@@ -89,7 +89,7 @@ def test_it_says_the_same_every_time_and_writes_over_its_own_tables_only(berteam
     first = {path.name: path.read_bytes() for path in place.iterdir()}
     assert set(first) == {"reference_points.csv", "embeddings.csv", "neighbours.csv"}
     (place / "notes.txt").write_text("mine")
-    berteam("evaluate", "run", "--top", "2")
+    berteam("evaluate", "run", "top=2")
     assert {name: (place / name).read_bytes() for name in first} == first
     berteam("train", *LEARNERS, "selector=mcaa", "epochs=2", "out=run", "on_exists=overwrite")
     assert [path.name for path in place.iterdir()] == ["notes.txt"]
@@ -128,7 +128,7 @@ def test_errors_are_one_sentence(berteam, tmp_path):
     berteam("train", *HANDS, "selector=uniform", "epochs=2", "out=run")
     (tmp_path / "empty").mkdir()
     berteam("tournament", "env=rps", "team_size=1", "games_per_pair=2", "out=cup")
-    for words in (["nowhere"], ["empty"], ["cup"], [], ["run", "--top", "0"], ["run", "--most", "-1"], ["run", "x"]):
+    for words in (["nowhere"], ["empty"], ["cup"], [], ["run", "top=0"], ["run", "most=-1"], ["run", "x"]):
         said = berteam("evaluate", *words, code=2)
         assert said.stderr.startswith("berteam: ")
         assert said.stderr.count("\n") == 1

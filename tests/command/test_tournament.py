@@ -49,7 +49,7 @@ def test_a_trained_run_and_inspect(berteam, tmp_path):
     assert (elo.games == 4 * 3).all()
     last = read(tmp_path / "run", "team_distribution").query("epoch == 4").nlargest(5, "probability")
     assert set(elo.team) == set(last.team)
-    shown = berteam("inspect", "run", "--top", "3").stdout
+    shown = berteam("inspect", "run", "top=3").stdout
     assert "Most probable teams after epoch 4" in " ".join(shown.split())
     assert "done" in shown
     assert "Strongest of 5" in berteam("inspect", "t").stdout

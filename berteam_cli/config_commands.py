@@ -1,0 +1,127 @@
+"""Schemas of the commands: the top level of each command's yaml."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from omegaconf import MISSING
+
+from berteam_cli.bounds import choice, number
+from berteam_cli.config_groups import (
+    EnvConfig,
+    EvaluationConfig,
+    LearnerConfig,
+    LoggerConfig,
+    OptimizerConfig,
+    PopulationConfig,
+    SelectorConfig,
+)
+
+
+@dataclass
+class CommandConfig:
+    """What every command that writes a folder has."""
+
+    seed: int = number(0, 2**63 - 1)
+    team_size: int = number(1, 512)
+    out: str | None = MISSING
+    on_exists: str = choice("error", "overwrite", "resume")
+    workers: int = number(0, 4096)
+    env: EnvConfig = MISSING
+
+
+@dataclass
+class TrainConfig(CommandConfig):
+    """Settings of ``berteam train``."""
+
+    epochs: int = number()
+    games_per_epoch: int = number(1)
+    device: str = choice("cpu", "cuda", "auto")
+    record_every: int = number(1)
+    payoff_steps: int = number()
+    checkpoint_every: int = number(1)
+    selector: SelectorConfig = MISSING
+    optimizer: OptimizerConfig = MISSING
+    population: PopulationConfig = MISSING
+    learner: LearnerConfig = MISSING
+    evaluation: EvaluationConfig = MISSING
+    logger: LoggerConfig = MISSING
+
+
+@dataclass
+class TournamentConfig(CommandConfig):
+    """Settings of ``berteam tournament``."""
+
+    run: str | None = MISSING
+    policies: list[str] = MISSING
+    top: int = number(2)
+    games_per_pair: int = number(1)
+
+
+@dataclass
+class ReplayConfig:
+    """Settings of ``berteam replay``."""
+
+    run: str | None = MISSING
+    blue: str | None = MISSING
+    red: str | None = MISSING
+    seed: int = number(0, 2**63 - 1)
+    format: str = choice("html", "gif", "both")
+    out: str | None = MISSING
+    on_exists: str = choice("error", "overwrite")
+    team_size: int = number(1, 512)
+    env: EnvConfig = MISSING
+
+
+@dataclass
+class OutputConfig:
+    """What commands share that look at runs which are there."""
+
+    seed: int = number(0, 2**63 - 1)
+    workers: int = number(0, 4096)
+
+
+@dataclass
+class EvaluateConfig(OutputConfig):
+    """Settings of ``berteam evaluate``."""
+
+    run: str = MISSING
+    games_per_pair: int = number(1)
+    reference_teams: int = number(2)
+    most: int = number()
+    payoff_games: int = number(1)
+    top: int = number(1)
+
+
+@dataclass
+class CompareConfig(OutputConfig):
+    """Settings of ``berteam compare``."""
+
+    runs: list[str] = MISSING
+    games: int = number(1)
+    reference_games: int = number(1)
+    reference_teams: int = number(2)
+    out: str | None = MISSING
+    on_exists: str = choice("error", "overwrite")
+
+
+@dataclass
+class ReproduceConfig:
+    """Settings of ``berteam reproduce``."""
+
+    what: str = choice("paper_fixed", "paper_coevolution", "paper_comparison")
+    scale: float = number(0, 1, open_low=True)
+    seeds: list[int] = MISSING
+    workers: int = number(0, 4096)
+    out: str | None = MISSING
+
+
+@dataclass
+class ReportConfig:
+    """Settings of ``berteam report``."""
+
+    runs: list[str] = MISSING
+    compare: str | None = MISSING
+    seed: int = number(0, 2**63 - 1)
+    out: str | None = MISSING
+    on_exists: str = choice("error", "overwrite")
