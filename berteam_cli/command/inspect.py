@@ -117,7 +117,8 @@ def show(folder: Path, top: int) -> None:
         return
     manifest = read_manifest(folder)
     console.print(f"{folder}: {manifest['status']}, started {manifest['started']}", highlight=False)
-    tables = {name: read_table(folder, name) for name in ("summary", "elo", "team_distribution", "agents", "pairs")}
+    shown = ("summary", "elo", "team_distribution", "agents", "pairs")
+    tables = {name: read_table(folder, name, whole=manifest["status"] == "done") for name in shown}
     summary, elo, teams, agents = (tables[x] for x in ("summary", "elo", "team_distribution", "agents"))
     if summary is not None and len(summary):
         console.print(printed("Figures", summary.T.reset_index().set_axis(["figure", "value"], axis=1)))

@@ -44,9 +44,11 @@ def report(config: ReportConfig, _: str, out: Path | None) -> float:
     text = page.html(Report(title, sections, rows, tables))
     for x in sections:
         for plot in x.plots:
+            picture = folder / (f"{x.key}_{plot.name}.png" if several else f"{plot.name}.png")
             if plot.png:
-                name = f"{x.key}_{plot.name}.png" if several else f"{plot.name}.png"
-                write_whole(folder / name, lambda part, png=plot.png: part.write_bytes(png))
+                write_whole(picture, lambda part, png=plot.png: part.write_bytes(png))
+            else:
+                picture.unlink(missing_ok=True)  # of an earlier report
     write_whole(folder / PAGE, lambda part: part.write_text(text, encoding="utf-8"))
     print(folder / PAGE)
     return math.nan

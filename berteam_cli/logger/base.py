@@ -23,23 +23,6 @@ class Logger(Protocol):
         """Ends."""
 
 
-class Nowhere:
-    """The logger beside which there are only the tables."""
-
-    def last(self) -> Mapping[str, int]:
-        """Returns nothing, which is what was written."""
-        return {}
-
-    def write(self, epoch: int, figures: Mapping[str, float]) -> None:
-        """Does nothing."""
-
-    def flush(self) -> None:
-        """Does nothing."""
-
-    def close(self) -> None:
-        """Does nothing."""
-
-
 class Once:
     """Hands each figure of an epoch to a logger once, however often a run goes on from before it."""
 

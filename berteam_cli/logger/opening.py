@@ -15,7 +15,8 @@ import numpy as np
 
 from berteam_cli.config_groups import LoggerConfig
 from berteam_cli.errors import InputError
-from berteam_cli.logger.base import Logger, Nowhere, Once
+from berteam_cli.logger.base import Logger, Once
+from berteam_cli.logger.csv import Nowhere
 from berteam_cli.training import Parts, Report, Run
 
 EXTRAS = ("wandb", "mlflow")
