@@ -10,7 +10,7 @@ from berteam_cli.report.source import Source
 
 STRONGEST = 20
 CELLS = 28
-DOTS = 2000
+DOTS, FEW = 2000, 100
 RATES = "`berteam evaluate RUN` rates all teams, and so does the end of a training with evaluation.games above 0."
 
 
@@ -49,7 +49,8 @@ def against_probability(source: Source) -> Plot:
     explained = np.corrcoef(elo, chance)[0, 1] ** 2 if chance.std() > 0 else 0.0
     dots = kept(len(elo), DOTS)
     figure, (plot,) = panels()
-    plot.plot(elo[dots], 10 ** chance[dots], "o", color=SERIES[0], alpha=0.45, markersize=3.5, markeredgewidth=0)
+    look = {"alpha": 0.85, "markersize": 5} if len(dots) < FEW else {"alpha": 0.5, "markersize": 3.5}
+    plot.plot(elo[dots], 10 ** chance[dots], "o", color=SERIES[0], markeredgewidth=0, **look)
     ends = np.array([elo.min(), elo.max()])
     plot.plot(ends, 10 ** (foot + slope * ends), color=SERIES[3], linewidth=1.8)
     plot.set(xlabel="Elo", ylabel="probability", yscale="log")
