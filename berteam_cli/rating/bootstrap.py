@@ -3,7 +3,7 @@
 Every game is drawn Poisson(1) times in a resample, independently of all others. Drawing within each pair of
 teams instead would make the variance (n - 1) / n of what it is: a half with two games a pair.
 
-Games that are copies of each other (``rating.copies``) must be counted once, or the intervals are too narrow.
+Games that are copies of each other (``rating.copies``) must be drawn together, or the intervals are too narrow.
 """
 
 from __future__ import annotations
@@ -72,6 +72,7 @@ def cell_samples(
     resamples: int = RESAMPLES,
     handicap: float = 0.0,
     start: Floats | None = None,
+    copies: Ints | None = None,
 ) -> Floats:
     """Returns (R, K) Elos with mean 1000, of games listed by who played and what came of it.
 
@@ -88,12 +89,14 @@ def cell_samples(
         resamples: R.
         handicap: in nats, of who stands alone, as in ``bradley_terry.ratings``.
         start: (K,) Elos near which to look.
+        copies: (C,) of how many copies each of these games stands for, which are drawn together; None: one.
     """
     some = counts > 0
+    weights = np.ones(int(some.sum())) if copies is None else np.asarray(copies, dtype=np.float64)[some]
     alone, others, scored = alone[some], others[some], np.asarray(scored, dtype=np.float64)[some]
     kept = np.asarray(counts, dtype=np.float64)[some]
     strengths = np.zeros(players) if start is None else np.asarray(nats(np.asarray(start, dtype=np.float64)))
-    return np.asarray(points(free_strengths(alone, others, scored, kept, handicap, strengths, rng, resamples)))
+    return np.asarray(points(free_strengths(alone, others, scored, kept, weights, handicap, strengths, rng, resamples)))
 
 
 def chances_of_few() -> Floats:
@@ -123,6 +126,7 @@ def free_strengths(
     others: np.ndarray,
     scored: np.ndarray,
     counts: np.ndarray,
+    copies: np.ndarray,
     handicap: float,
     start: np.ndarray,
     rng: Generator,
@@ -135,7 +139,7 @@ def free_strengths(
     for r in range(resamples):
         games, made = np.zeros((players, players)), np.full(players, 0.5 * PRIOR_DRAWS)
         for c in range(len(counts)):
-            drawn = times(counts[c], rng)
+            drawn = times(counts[c], rng) * copies[c]
             games[alone[c], others[c]] += drawn
             made[alone[c]] += drawn * scored[c]
             made[others[c]] += drawn * (1.0 - scored[c])
