@@ -121,6 +121,7 @@ def elo_rows(rated: Truth, called: list[str], *, exact: bool) -> Iterator[tuple[
             *(rated.wins[k] + rated.draws[k] + rated.losses[k], rated.wins[k], rated.draws[k], rated.losses[k]),
             *(chosen.probability[k], rank),
             *((predicted[k], place[k]) if exact else (math.nan, math.nan)),
+            *(math.nan, math.nan),
         )
 
 
