@@ -107,7 +107,7 @@ class CompareConfig(OutputConfig):
     reference_games: int = number(1)
     reference_teams: int = number(2)
     out: str | None = MISSING
-    on_exists: str = choice("error", "overwrite")
+    on_exists: str = choice("error", "overwrite", "resume")
 
 
 @dataclass

@@ -53,6 +53,18 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "strategies": (
         *("team", "members", "alpha_rank", "alpha_rank_low", "alpha_rank_high", "nash", "nash_low", "nash_high"),
     ),
+    "comparison": (
+        *("algorithm", "seeds", "expected_elo", "expected_elo_low", "expected_elo_high"),
+        *("mixed_elo", "mixed_elo_low", "mixed_elo_high", "epoch_s", "update_s", "iqm", "iqm_low", "iqm_high"),
+    ),
+    "runs": (
+        *("algorithm", "seed", "run", "epochs", "expected_elo", "expected_elo_low", "expected_elo_high"),
+        *("mixed_elo", "mixed_elo_low", "mixed_elo_high", "epoch_s", "update_s"),
+    ),
+    "versus": (
+        *("algorithm", "opponent", "games", "wins", "draws", "losses", "score", "score_low", "score_high"),
+        *("superiority", "improvement", "improvement_low", "improvement_high"),
+    ),
     "reference_points": (
         *("epoch", "team", "members", "probability", "fixed_point", "replicator", "nash"),
         *("against_mix", "worst", "most_lost"),

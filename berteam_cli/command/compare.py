@@ -1,0 +1,179 @@
+"""berteam compare: which selector and which optimizer is better, and how sure it is (paper, Table 3)."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from rich.console import Console
+
+from berteam_cli.command.inspect import printed, read_table
+from berteam_cli.config_commands import CompareConfig
+from berteam_cli.errors import InputError
+from berteam_cli.evaluation.comparison import Comparison, Figures, Played, compared, counted, planned
+from berteam_cli.evaluation.contenders import Contender, algorithms, contenders
+from berteam_cli.evaluation.playing import forget, play_all
+from berteam_cli.evaluation.reference import reference
+from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
+from berteam_cli.games import Games
+from berteam_cli.outcomes import Ints
+from berteam_cli.rating.bootstrap import interval, superiority
+from berteam_cli.records import COLUMNS, write_table
+from berteam_cli.stored import check_same, write_config
+from berteam_cli.training import key
+from berteam_cli.workers import Workers, available_cores
+
+log = logging.getLogger("berteam")
+
+TABLES = ("comparison", "runs", "versus")
+AGENTS_S = ("select_s", "play_s", "learn_s", "renew_s", "probe_s")  # the paper's time of agents
+
+
+def compare(config: CompareConfig, text: str, folder: Path | None = None) -> float:
+    """Plays the runs against each other and the fixed teams, and writes the tables; returns NaN.
+
+    Args:
+        config: checked.
+        text: the same as yaml, for the folder.
+        folder: None makes one.
+
+    Raises:
+        InputError: the runs cannot be compared, or the folder is not free.
+        RunError: it failed.
+    """
+    runs = contenders([Path(x) for x in config.runs])
+    names, of = algorithms(runs)
+    seconds = [times(x.folder) for x in runs]
+    folder = folder or new_folder("compare")
+    manifest = begun(folder, config, text, names, runs)
+    with (
+        logging_to(folder),
+        manifest.until_the_end(again=f"Go on with the same command, out={folder} on_exists=resume."),
+    ):
+        log.info("%s", folder)
+        for x in runs:
+            if x.broken:
+                log.info("%s.", x.broken)
+        games = Games(runs[0].parts.games.env, Workers(config.workers or available_cores()))
+        known = reference(games, config.reference_teams)
+        rng = np.random.default_rng(config.seed)
+        plan = planned(runs, of, known, games.env.standard_policies, config.games, config.reference_games, rng)
+        sheet = folder / "checkpoint" / "played"
+        outcomes = play_all(games, plan.acting, plan.lineups, key(rng), f"Comparing {len(runs)} runs", sheet)
+        played = counted(plan, outcomes, len(known.teams))
+        found = compared(played, of, known, np.random.default_rng([config.seed, 1]))
+        manifest.add(games=len(plan.lineups), reference=known.source)
+        write_table(folder / "comparison.csv", COLUMNS["comparison"], comparison_rows(found, names, of, seconds))
+        write_table(folder / "runs.csv", COLUMNS["runs"], run_rows(found.runs, names, of, runs, seconds))
+        write_table(folder / "versus.csv", COLUMNS["versus"], versus_rows(found, played, names, of))
+        forget(sheet)
+    show(folder)
+    return math.nan
+
+
+def begun(folder: Path, config: CompareConfig, text: str, names: list[str], runs: list[Contender]) -> Manifest:
+    """Returns the manifest of a comparison that begins, or goes on, in ``folder``.
+
+    Raises:
+        InputError: the folder is not free, or holds another comparison.
+    """
+    if config.on_exists == "resume" and (folder / CONFIG).exists():
+        check_same(folder, text)
+        if Manifest.of(folder).facts["status"] == "done":
+            raise InputError(f"out={folder} holds this comparison already, and it is done.")
+        return Manifest.resumed(folder)
+    if any(folder.resolve() == x.folder.resolve() for x in runs):
+        raise InputError(f"out={folder} is one of the runs; choose another folder.")
+    claim(folder, config.on_exists)
+    write_config(folder, text)
+    broken = [x.broken for x in runs if x.broken]
+    return Manifest.begun(folder, seed=config.seed, algorithms=names, runs=len(runs), broken_off=broken)
+
+
+def times(folder: Path) -> tuple[float, float]:
+    """Returns the seconds that a run takes for an epoch of its agents, and for an update of its selector.
+
+    Raises:
+        InputError: its tables cannot be read.
+    """
+    timing, selector = (read_table(folder, name, whole=False) for name in ("timing", "selector"))
+    if timing is None or selector is None or not len(timing):
+        return math.nan, math.nan
+    updates = int((selector.updates > 0).sum())
+    return float(timing[list(AGENTS_S)].sum(axis=1).mean()), float(
+        timing.selector_s.sum()
+    ) / updates if updates else 0.0
+
+
+def with_interval(value: float, samples: np.ndarray) -> tuple[float, float, float]:
+    """Returns ``value`` and the ends of the 95 % interval of its ``samples``, NaN where they are."""
+    low, high = interval(samples)
+    return float(value), float(low), float(high)
+
+
+def elos(figures: Figures, k: int) -> tuple[float, ...]:
+    """Returns the expected and the mixed Elo of player ``k``, each with its interval."""
+    expected = with_interval(figures.expected[k], figures.expected_samples[:, k])
+    return *expected, *with_interval(figures.mixed[k], figures.mixed_samples[:, k])
+
+
+def comparison_rows(
+    found: Comparison, names: list[str], of: Ints, seconds: list[tuple[float, float]]
+) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of comparison.csv, the strongest algorithm first."""
+    for a in np.argsort(-found.algorithms.mixed, kind="stable"):
+        mine = [x for x, algorithm in zip(seconds, of, strict=True) if algorithm == a]
+        middle = with_interval(found.iqm[a], found.iqm_samples[:, a])
+        yield names[a], len(mine), *elos(found.algorithms, a), *np.mean(mine, axis=0), *middle
+
+
+def run_rows(
+    figures: Figures, names: list[str], of: Ints, runs: list[Contender], seconds: list[tuple[float, float]]
+) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of runs.csv."""
+    for r, run in enumerate(runs):
+        yield names[of[r]], run.seed, str(run.folder), run.run.epoch, *elos(figures, r), *seconds[r]
+
+
+def versus_rows(found: Comparison, played: Played, names: list[str], of: Ints) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of versus.csv: each algorithm against each other."""
+    owned = (np.arange(len(names))[:, np.newaxis] == of).astype(np.int64)
+    counts = np.einsum("ar,rsc,bs->abc", owned, played.versus, owned)
+    above = superiority(found.algorithms.mixed_samples)
+    for a, b in np.ndindex(len(names), len(names)):
+        if a != b:
+            score = with_interval(found.algorithms.scores[a, b], found.algorithms.score_samples[:, a, b])
+            better = with_interval(found.improvement[a, b], found.improvement_samples[:, a, b])
+            yield names[a], names[b], counts[a, b].sum(), *counts[a, b], *score, above[a, b], *better
+
+
+def show(folder: Path) -> None:
+    """Prints the tables of a comparison."""
+    console = Console(width=None if Console().is_terminal else 140)
+    titles = ("Algorithms: Elo with 95 % intervals, seconds", "Runs", "Algorithm against algorithm")
+    for name, title in zip(TABLES, titles, strict=True):
+        console.print(printed(title, narrow(pd.read_csv(folder / f"{name}.csv"))))
+        console.print(str(folder / f"{name}.csv"), highlight=False, soft_wrap=True)
+
+
+def narrow(table: pd.DataFrame) -> pd.DataFrame:
+    """Returns ``table`` with each figure and its interval in one column."""
+    for name in [x.removesuffix("_low") for x in table.columns if x.endswith("_low")]:
+        columns = [name, f"{name}_low", f"{name}_high"]
+        digits = 0 if table[name].abs().max() >= 10 else 3
+        table[name] = [spoken(*row, digits) for row in table[columns].itertuples(index=False)]
+        table = table.drop(columns=columns[1:])
+    return table
+
+
+def spoken(value: float, low: float, high: float, digits: int) -> str:
+    """Returns a figure with its interval, as far as they are known."""
+    if math.isnan(value):
+        return ""
+    known = "" if math.isnan(low) else f" [{low:.{digits}f}, {high:.{digits}f}]"
+    return f"{value:.{digits}f}{known}"
