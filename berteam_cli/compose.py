@@ -76,6 +76,21 @@ def check(command: str, words: list[str], verify: Callable[[Any, list[str]], obj
             verify(checked(config), [x.key_or_group for x in job])
 
 
+def config_of(command: str, words: list[str]) -> tuple[Any, str]:
+    """Returns the checked config that the command line ``words`` give, and the same as yaml.
+
+    Args:
+        command: name of the primary config.
+        words: overrides, none of them a sweep.
+
+    Raises:
+        InputError: a choice, a key or a value is wrong.
+    """
+    with initialize_config_module(CONF, version_base="1.3", job_name=command):
+        config = composed(command, [], parsed(words))
+        return checked(config), OmegaConf.to_yaml(config, resolve=True)
+
+
 def check_sweep_folder(overrides: list[Override]) -> None:
     """Checks that the folder named for a sweep holds none yet: its runs would be taken for this one's.
 

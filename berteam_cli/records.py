@@ -65,6 +65,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("algorithm", "opponent", "games", "wins", "draws", "losses", "score", "score_low", "score_high"),
         *("superiority", "improvement", "improvement_low", "improvement_high"),
     ),
+    "paper": ("quantity", "paper", "here", "low", "high", "source"),
     "reference_points": (
         *("epoch", "team", "members", "probability", "fixed_point", "replicator", "nash"),
         *("against_mix", "worst", "most_lost"),
