@@ -26,7 +26,7 @@ def rated(probability, elos, listed=True, draws=0, width=10.0):
     probability, listed = np.asarray(probability, dtype=float), np.broadcast_to(listed, count)
     draws = np.broadcast_to(draws, count)
     chosen = Chosen(zeros[:, np.newaxis], probability, listed, draws, float(probability[listed].sum()))
-    return Truth(chosen, np.asarray(elos, dtype=float), np.full(count, width), zeros, zeros, zeros)
+    return Truth(chosen, np.asarray(elos, dtype=float), np.full(count, width), np.zeros((3, count, 1), dtype=int))
 
 
 def test_all_teams_are_rated_if_there_are_games_for_them():
@@ -97,9 +97,8 @@ def test_the_interval_of_the_expected_elo_covers_it():
     covered = 0
     for seed in range(300):
         chosen = choose_teams(found, drawn_by(found, seed), 1, 16)
-        zeros = np.zeros(len(chosen), dtype=int)
         known = np.array([by_team[tuple(t)] for t in chosen.teams])
-        mean, width = Truth(chosen, known, np.zeros(len(chosen)), zeros, zeros, zeros).expected_elo()
+        mean, width = Truth(chosen, known, np.zeros(len(chosen)), np.zeros((3, len(chosen), 1))).expected_elo()
         covered += abs(mean - found.probability @ elos) <= width
     assert 0.90 <= covered / 300 <= 1
 
@@ -119,7 +118,7 @@ def test_the_fixed_teams_get_their_own_elos_back():
     chosen = Chosen(known.teams, np.full(28, 1 / 28), np.ones(28, dtype=bool), np.zeros(28, dtype=int), 1.0)
     found = truth(games, fixed_policies(range(7)), chosen, known, 2, np.random.default_rng(0))
     assert (np.abs(found.elos - known.elos) < found.half_widths).all()
-    assert (found.wins + found.draws + found.losses == 56).all()
+    assert (found.results.sum(axis=0) == 2).all()
     assert np.corrcoef(found.elos, known.elos)[0, 1] > 0.98
 
 
@@ -139,8 +138,8 @@ def test_the_fixed_teams_get_their_own_elos_back_among_more_sides(sides):
     found = truth(games, fixed_policies(range(3)), chosen, known, 2 * sides, np.random.default_rng(0))
     assert np.ptp(known.elos) > 80
     np.testing.assert_allclose(found.elos, known.elos, atol=3)  # but for the prior's pull to the mean
-    np.testing.assert_array_equal(found.wins + found.draws + found.losses, 12 * sides)
-    np.testing.assert_array_equal(found.draws > found.losses, found.elos > 1000)  # against itself a team draws
+    np.testing.assert_array_equal(found.record.sum(axis=0), 12 * sides)
+    np.testing.assert_array_equal(found.record[1] > found.record[2], found.elos > 1000)  # against itself a team draws
 
 
 @pytest.mark.parametrize("sides", [3, 5])
@@ -151,4 +150,4 @@ def test_alone_a_share_of_the_points_is_what_an_equal_scores(sides):
     rocks = Reference(np.zeros((1, 1), dtype=int), np.full(1, 1000.0), "by hand")
     found = truth(games, fixed_policies(range(3)), one, rocks, 1, np.random.default_rng(0))
     assert found.elos[0] == pytest.approx(1000, abs=1e-6)
-    assert (found.wins[0], found.draws[0], found.losses[0]) == (0, 1, 0)
+    assert found.record[:, 0].tolist() == [0, 1, 0]
