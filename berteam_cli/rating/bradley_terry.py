@@ -20,10 +20,20 @@ PRIOR_DRAWS = 0.25
 
 Z_95 = 1.959964  # two-sided 95 % of the normal distribution
 
+STEPS = 200  # of Newton's method, at most; the likelihood is concave
+LONGEST_STEP_NAT = 1.0  # farther away its parabola is not to be trusted
+ARRIVED_NAT = 1e-11
+
 
 def expected(strengths: Floats, others: Floats) -> Floats:
     """Returns the expected score of ``strengths`` against ``others``, nats, in [0, 1]; broadcasts."""
     return 0.5 * (1.0 + np.tanh(0.5 * (strengths - others)))
+
+
+def slope_at(strengths: Floats) -> Floats:
+    """Returns how fast the expected score against an average player grows with ``strengths``, per nat."""
+    chance = expected(strengths, 0.0)
+    return chance * (1 - chance)
 
 
 def ratings(scores: Floats, games: Floats, handicap: float = 0.0) -> tuple[Floats, Floats]:
@@ -45,24 +55,24 @@ def ratings(scores: Floats, games: Floats, handicap: float = 0.0) -> tuple[Float
     shared = (games - scores).T if handicap > 0 else np.zeros_like(games)
     made = scores.sum(axis=1) + shared.sum(axis=1) + 0.5 * PRIOR_DRAWS
 
-    def loss_and_slope(strengths: Floats) -> tuple[float, Floats]:
-        gaps = strengths[:, np.newaxis] - strengths
-        # -ln likelihood: each game appears twice, as row's and as column's, with scores that add up to it.
-        loss = (scores * np.logaddexp(0.0, handicap - gaps)).sum()
-        loss += (shared * np.logaddexp(0.0, -handicap - gaps)).sum()
-        loss += PRIOR_DRAWS * (np.logaddexp(0.0, -strengths) + 0.5 * strengths).sum()
-        alone, together = chances(strengths)
-        hoped = (games * alone).sum(axis=1) + (crowds * together).sum(axis=1)
-        return float(loss), hoped + PRIOR_DRAWS * expected(strengths, 0.0) - made
-
     def chances(strengths: Floats) -> tuple[Floats, Floats]:
         own = strengths[:, np.newaxis]
         return expected(own, strengths + handicap), expected(own, strengths - handicap)
 
-    from scipy.optimize import minimize  # noqa: PLC0415 (half a second, and only tournaments need it)
-
-    fit = minimize(loss_and_slope, np.zeros(len(games)), jac=True, method="BFGS", options={"gtol": 1e-9})
-    strengths = fit.x - fit.x.mean()
+    strengths = np.zeros(len(games))
+    for _ in range(STEPS):
+        alone, together = chances(strengths)
+        missing = made - (games * alone).sum(axis=1) - (crowds * together).sum(axis=1)
+        missing -= PRIOR_DRAWS * expected(strengths, 0.0)
+        spread = games * alone * (1 - alone) + crowds * together * (1 - together)
+        spread = 0.5 * (spread + spread.T)  # equal but for rounding: each game is in both triangles
+        curvature = np.diag(spread.sum(axis=1) + PRIOR_DRAWS * slope_at(strengths)) - spread
+        step = np.linalg.solve(curvature, missing)
+        longest = np.abs(step).max()
+        strengths += step * min(1.0, LONGEST_STEP_NAT / max(longest, LONGEST_STEP_NAT))
+        if longest < ARRIVED_NAT:
+            break
+    strengths = strengths - strengths.mean()
     alone, together = chances(strengths)
     information = (games * alone * (1 - alone)).sum(axis=1) + (crowds * together * (1 - together)).sum(axis=1)
     return points(strengths), Z_95 * POINTS_PER_NAT / np.sqrt(information + PRIOR_DRAWS / 4)
