@@ -13,11 +13,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from berteam_cli.errors import InputError, RunError
-from berteam_cli.records import COLUMNS, EVALUATION
+from berteam_cli.records import COLUMNS, EVALUATION, SHEET_ENDINGS, SHEETS
 
 MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
 PACKAGES = ("berteam-cli", "torch", "numpy", "numba", "pandas", "stable-baselines3", "pettingzoo", "hydra-core")
@@ -47,6 +48,8 @@ def claim(folder: Path, on_exists: str) -> None:
         for name in (*(f"{table}.csv" for table in COLUMNS), MANIFEST, CONFIG, LOG, ERROR):
             for place in (folder, folder / EVALUATION):
                 (place / name).unlink(missing_ok=True)
+        for sheet, ending in product(SHEETS, SHEET_ENDINGS):
+            (folder / EVALUATION / f"{sheet}{ending}").unlink(missing_ok=True)
         shutil.rmtree(folder / "checkpoint", ignore_errors=True)
     made = missing(folder)
     try:
@@ -122,8 +125,12 @@ class Manifest:
         os.replace(part, self.folder / MANIFEST)
 
     @contextmanager
-    def until_the_end(self, resumable: bool = True) -> Iterator[None]:
+    def until_the_end(self, resumable: bool = True, advice: str | None = None) -> Iterator[None]:
         """Notes how what is done inside ends: done, interrupted or failed.
+
+        Args:
+            resumable: whether `berteam resume` goes on from the folder's checkpoint.
+            advice: how to go on, if otherwise.
 
         Raises:
             RunError: it failed; the traceback is in error.txt.
@@ -132,6 +139,8 @@ class Manifest:
         (self.folder / ERROR).unlink(missing_ok=True)
 
         def go_on() -> str:
+            if advice is not None:
+                return advice
             if resumable and any((self.folder / "checkpoint").glob("epoch_*")):
                 return f"Go on with: berteam resume {self.folder}"
             return "Begin anew with on_exists=overwrite."

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.optimizer.aggression import aggression
 from berteam_cli.outcomes import Floats, Ints, Outcomes
+from berteam_cli.population import island_of, names
 from berteam_cli.rating.bootstrap import RESAMPLES, interval
+from berteam_cli.records import team_names
 from berteam_cli.selector.base import TeamDistribution
+from berteam_cli.training import Parts, Run
 
 DEFENSIVE, NEUTRAL, AGGRESSIVE = "defensive", "neutral", "aggressive"
 BALANCED, OTHER = "balanced", "other"
@@ -82,3 +87,26 @@ def composition(distribution: TeamDistribution, members: Floats) -> list[tuple[s
     if distribution.samples:
         rows.append((OTHER, 0, distribution.other))
     return rows
+
+
+def member_rows(run: Run, parts: Parts, behaved: Manners, rng: Generator) -> list[tuple[Any, ...]]:
+    """Returns the rows of members.csv, of teams made only of one member each."""
+    islands = parts.optimizer.islands
+    called, home, shown = names(islands, run.population), island_of(islands), behaved.aggression
+    low, high = behaved.interval(rng)
+    made = [behaved.made[name] for name in ("tags", "times_tagged", "captures", "grabs", "wall_hits")]
+    games = behaved.ratios.shape[1]
+    return [
+        (
+            *(run.epoch, n, called[n], islands[home[n]].name, shown[n], low[n], high[n]),
+            *(*(count[n] for count in made), group(shown[n]), games),
+        )
+        for n in range(len(shown))
+    ]
+
+
+def team_rows(teams: Ints, behaved: Manners, members: Floats) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of teams.csv without the epoch; ``members`` is (N,) their aggression."""
+    games = behaved.ratios.shape[1]
+    for row in zip(team_names(teams), behaved.aggression, kinds(teams, members), strict=True):
+        yield (*row, games)

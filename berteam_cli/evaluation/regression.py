@@ -46,7 +46,7 @@ def figures(x: Floats, y: Floats, error_variance: Floats) -> dict[str, Floats]:
     """Returns (R,) each figure of ``regression`` for R samples of teams, (R, K)."""
     slope, intercept, r_squared = line(x, y)
     by_rank, _, shared = line(ranks(x), ranks(y))
-    variance = x.var(axis=1, ddof=1)
+    variance = scatter(x, x - x.mean(axis=1, keepdims=True)) / (x.shape[1] - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         reliability = (variance - error_variance.mean(axis=1)) / variance
         known = np.where(reliability > 0, reliability, np.nan)

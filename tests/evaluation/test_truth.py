@@ -4,8 +4,10 @@ import pytest
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
 from berteam_cli.evaluation.reference import Reference, reference
-from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
+from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, fixture, truth
 from berteam_cli.games import Games
+from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, expected
+from berteam_cli.rating.elo import nats
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
 from berteam_cli.workers import Workers
 from tests.makers import mctf
@@ -120,6 +122,26 @@ def test_the_fixed_teams_get_their_own_elos_back():
     assert (np.abs(found.elos - known.elos) < found.half_widths).all()
     assert (found.results.sum(axis=0) == 2).all()
     assert np.corrcoef(found.elos, known.elos)[0, 1] > 0.98
+    # Of held anchors, each team makes the points that are expected of it, but for the prior's.
+    strengths, held = nats(found.elos)[:, np.newaxis], nats(known.elos)
+    made = (found.results[0] + 0.5 * found.results[1]).sum(axis=1)
+    missing = made - (2 * expected(strengths, held)).sum(axis=1)
+    np.testing.assert_allclose(missing, PRIOR_DRAWS * (expected(strengths[:, 0], 0.0) - 0.5), atol=1e-6)
+
+
+def test_teams_stand_on_both_sides_and_in_all_orders_equally_often():
+    games = mctf(2)
+    known = reference(games, 28)
+    teams = unordered_teams(7, 2)[[1, 8]]
+    found = fixture(games, fixed_policies(range(7)), teams, known, 8, np.random.default_rng(0))
+    assert found.shape == (2, 28, 8)
+    side = found.held.argmax(axis=1)
+    ours = found.lineups.teams[np.arange(len(side)), side].reshape(2, 28, 8, 2)
+    theirs = found.lineups.teams[np.arange(len(side)), 1 - side].reshape(2, 28, 8, 2) - 7
+    np.testing.assert_array_equal(np.sort(ours, axis=3), np.broadcast_to(teams[:, None, None], ours.shape))
+    np.testing.assert_array_equal(np.sort(theirs, axis=3), np.broadcast_to(known.teams[None, :, None], theirs.shape))
+    ways = {(*a, *b, s) for a, b, s in zip(ours[0, 1], theirs[0, 1], side.reshape(2, 28, 8)[0, 1], strict=True)}
+    assert len(ways) == 8  # 0-1 against 0-1: two orders of each, from both sides
 
 
 def test_other_rules_have_another_yardstick():
