@@ -22,7 +22,7 @@ from berteam_cli.training import Parts, Run
 
 log = logging.getLogger("berteam")
 
-SCHEMA = 3  # raised when a file of an older version could be misread
+SCHEMA = 4  # raised when a file of an older version could be misread
 KEPT = 2
 
 

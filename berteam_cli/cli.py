@@ -114,8 +114,10 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
     from berteam_cli import build  # noqa: PLC0415
 
     if word == "train":
+        from berteam_cli.logger.opening import check_logger  # noqa: PLC0415
         from berteam_cli.stored import goes_on  # noqa: PLC0415
 
+        check_logger(config.logger)
         build.parts(config, stored=goes_on(config, Path(config.out) if config.out else None))
     elif word == "tournament":
         from berteam_cli.command import tournament  # noqa: PLC0415
@@ -125,6 +127,10 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
         from berteam_cli.command import replay  # noqa: PLC0415
 
         replay.players(config, keys)
+    elif word == "report":
+        from berteam_cli.command import report  # noqa: PLC0415
+
+        report.read(config)
 
 
 def command_of(word: str) -> Callable[[Any, str, Path | None], float]:
@@ -198,7 +204,7 @@ def resume(word: str, words: list[str]) -> None:
         word,
         words,
         run={"type": Path, "help": "folder of the run"},
-        overrides={"nargs": "*", "help": "epochs=N, workers=N, checkpoint_every=N, evaluation.games=N"},
+        overrides={"nargs": "*", "help": "epochs=N, workers=N, checkpoint_every=N, evaluation.games=N, logger=NAME"},
     )
     from berteam_cli.command.resume import resume as go_on  # noqa: PLC0415
 

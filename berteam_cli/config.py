@@ -34,9 +34,11 @@ from berteam_cli.config_groups import (
     EvaluationConfig,
     FixedLearnerConfig,
     FixedOptimizerConfig,
+    LoggerConfig,
     MapElitesConfig,
     McaaConfig,
     MctfConfig,
+    MlflowConfig,
     PettingzooConfig,
     PopulationConfig,
     PpoConfig,
@@ -44,6 +46,7 @@ from berteam_cli.config_groups import (
     RpsConfig,
     Sb3Config,
     UniformConfig,
+    WandbConfig,
 )
 from berteam_cli.errors import InputError, did_you_mean
 
@@ -62,6 +65,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
     "learner": {"fixed": FixedLearnerConfig, "ppo": PpoConfig, "dqn": DqnConfig, "sb3": Sb3Config},
     "population": {"islands": PopulationConfig},
     "evaluation": {"truth": EvaluationConfig},
+    "logger": {"csv": LoggerConfig, "tensorboard": LoggerConfig, "wandb": WandbConfig, "mlflow": MlflowConfig},
     "command": {
         "train": TrainConfig,
         "tournament": TournamentConfig,

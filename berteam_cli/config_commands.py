@@ -11,6 +11,7 @@ from berteam_cli.config_groups import (
     EnvConfig,
     EvaluationConfig,
     LearnerConfig,
+    LoggerConfig,
     OptimizerConfig,
     PopulationConfig,
     SelectorConfig,
@@ -44,6 +45,7 @@ class TrainConfig(CommandConfig):
     population: PopulationConfig = MISSING
     learner: LearnerConfig = MISSING
     evaluation: EvaluationConfig = MISSING
+    logger: LoggerConfig = MISSING
 
 
 @dataclass

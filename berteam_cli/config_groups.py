@@ -367,3 +367,26 @@ class EvaluationConfig:
     games: int | None = number()
     games_per_pair: int = number(1)
     reference_teams: int = number(2)
+
+
+@dataclass
+class LoggerConfig:
+    """Where the figures of an epoch go beside the tables; logger/."""
+
+    name: str = MISSING
+
+
+@dataclass
+class WandbConfig(LoggerConfig):
+    """Settings of logger/wandb.py."""
+
+    project: str = MISSING
+    mode: str = choice("offline", "online")
+
+
+@dataclass
+class MlflowConfig(LoggerConfig):
+    """Settings of logger/mlflow.py."""
+
+    experiment: str = MISSING
+    tracking: str | None = MISSING

@@ -50,7 +50,8 @@ def claim(folder: Path, on_exists: str) -> None:
                 (place / name).unlink(missing_ok=True)
         for sheet, ending in product(SHEETS, SHEET_ENDINGS):
             (folder / EVALUATION / f"{sheet}{ending}").unlink(missing_ok=True)
-        shutil.rmtree(folder / "checkpoint", ignore_errors=True)
+        for name in ("checkpoint", "tensorboard"):
+            shutil.rmtree(folder / name, ignore_errors=True)
     made = missing(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -42,8 +42,8 @@ class Recorder:
     every: int
     exploiting: Exploiting
 
-    def epoch(self, run: Run, report: Report) -> None:
-        """Records an epoch, and after every ``every``-th one the state it led to."""
+    def epoch(self, run: Run, report: Report) -> dict[str, float]:
+        """Records an epoch, and after every ``every``-th one the state it led to, whose figures are returned."""
         clock = Clock()
         selecting = report.selecting
         entropy = effective = exploited = math.nan
@@ -63,6 +63,7 @@ class Recorder:
         clock.lap("record_s")
         seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
         self.tables.add("timing", [tuple(seconds[column] for column in COLUMNS["timing"])])
+        return {"effective_teams": effective, "entropy": entropy, "exploitability": exploited}
 
     def distribution(self, run: Run) -> TeamDistribution:
         """Returns the distribution over teams after ``run.epoch`` epochs."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from berteam_cli.config_groups import IslandConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import CONFIG
 
-MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation")
+MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation", "logger")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
 PLACE = ("out", "on_exists")
 """Keys that say where a run goes, not what it does."""
@@ -55,7 +56,7 @@ def stored_config(folder: Path) -> DictConfig:
     plain = plain_config(folder)
     try:
         typed = OmegaConf.structured(TrainConfig)
-        for group in ("env", "selector", "optimizer", "learner"):
+        for group in ("env", "selector", "optimizer", "learner", "logger"):
             typed[group] = OmegaConf.structured(SCHEMAS[group][plain[group].name])
         typed.evaluation = OmegaConf.structured(SCHEMAS["evaluation"]["truth"])
         typed.population = OmegaConf.structured(SCHEMAS["population"]["islands"])
@@ -67,6 +68,19 @@ def stored_config(folder: Path) -> DictConfig:
     except (OmegaConfBaseException, AttributeError, KeyError, TypeError) as error:
         said = str(error).splitlines()[0]
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
+
+
+def whole_choice(group: str, name: str) -> DictConfig:
+    """Returns the config that choice ``name`` of a group without choices of its own stands for.
+
+    Raises:
+        InputError: there is no such choice.
+    """
+    if name not in SCHEMAS[group]:
+        raise InputError.choice(group, name, SCHEMAS[group])
+    text = files("berteam_cli.conf").joinpath(group, f"{name}.yaml").read_text(encoding="utf-8")
+    values = {key: value for key, value in yaml.safe_load(text).items() if key != "defaults"}
+    return OmegaConf.merge(OmegaConf.structured(SCHEMAS[group][name]), values)
 
 
 def goes_on(config: TrainConfig, folder: Path | None) -> bool:

@@ -27,7 +27,8 @@ def wheel(tmp_path_factory):
 
 def test_the_wheel_holds_what_it_should(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    for path in [*ROOT.glob("conf/**/*.yaml"), *ROOT.glob("berteam_cli/**/*.py"), *ROOT.glob("berteam_cli/**/*.csv")]:
+    kept = ("conf/**/*.yaml", "berteam_cli/**/*.py", "berteam_cli/**/*.csv", "berteam_cli/**/page.*")
+    for path in (path for pattern in kept for path in ROOT.glob(pattern)):
         inside = path.relative_to(ROOT).as_posix()
         inside = inside if inside.startswith("berteam_cli") else f"berteam_cli/{inside}"
         assert inside in names

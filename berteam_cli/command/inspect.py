@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -15,23 +18,47 @@ from berteam_cli.records import COLUMNS
 WHOLE = {"team": str, "blue": str, "red": str, "best_team": str, "opponent": str}  # 3 is a team, not a number
 
 
-def read_table(folder: Path, name: str) -> pd.DataFrame | None:
+def read_table(
+    folder: Path, name: str, columns: Sequence[str] | None = None, *, whole: bool = True
+) -> pd.DataFrame | None:
     """Returns table ``name`` of the run in ``folder``, None if it has none.
 
+    Args:
+        folder: of the run.
+        name: of the table.
+        columns: that it must have; None: all that this version writes.
+        whole: whether a last line that is cut off is an error; else it is left away, as while a run goes on.
+
     Raises:
-        InputError: the file is no such table.
+        InputError: the file is no such table, or is cut off.
     """
     path = folder / f"{name}.csv"
     if not path.exists():
         return None
     try:
-        table = pd.read_csv(path, dtype=WHOLE)
+        text = path.read_bytes()
+        end = whole_lines(text)
+        if end < len(text) and whole:
+            line = text.count(b"\n", 0, end) + 1
+            raise InputError(f"{path} is cut off in the middle of line {line}; have it written anew.")
+        table = pd.read_csv(io.BytesIO(text[:end]), dtype=WHOLE)
     except (ValueError, OSError) as error:
         raise InputError(f"{path} cannot be read as a table: {error}.") from error
-    absent = [column for column in COLUMNS[name] if column not in table.columns]
+    absent = [column for column in (COLUMNS[name] if columns is None else columns) if column not in table.columns]
     if absent:
         raise InputError(f"{path} is no table of this version: it has no column {absent[0]}.")
     return table
+
+
+def whole_lines(text: bytes) -> int:
+    """Returns how many bytes of a table are whole lines: its last must have an end and as many cells as its first."""
+    if not text.endswith(b"\n"):
+        return text.rfind(b"\n") + 1
+    begin = text.rfind(b"\n", 0, len(text) - 1) + 1
+    first, last = (
+        next(csv.reader([line.decode(errors="replace")]), []) for line in (text.partition(b"\n")[0], text[begin:])
+    )
+    return begin if len(last) < len(first) and b'"' not in text[begin:] else len(text)
 
 
 def inspect(folder: Path, top: int) -> None:
@@ -90,7 +117,8 @@ def show(folder: Path, top: int) -> None:
         return
     manifest = read_manifest(folder)
     console.print(f"{folder}: {manifest['status']}, started {manifest['started']}", highlight=False)
-    tables = {name: read_table(folder, name) for name in ("summary", "elo", "team_distribution", "agents", "pairs")}
+    shown = ("summary", "elo", "team_distribution", "agents", "pairs")
+    tables = {name: read_table(folder, name, whole=manifest["status"] == "done") for name in shown}
     summary, elo, teams, agents = (tables[x] for x in ("summary", "elo", "team_distribution", "agents"))
     if summary is not None and len(summary):
         console.print(printed("Figures", summary.T.reset_index().set_axis(["figure", "value"], axis=1)))

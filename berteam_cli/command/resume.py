@@ -12,7 +12,7 @@ from berteam_cli.command.train import train
 from berteam_cli.config import checked, one_line
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.folder import read_manifest
-from berteam_cli.stored import MAY_CHANGE, stored_config
+from berteam_cli.stored import MAY_CHANGE, stored_config, whole_choice
 
 
 def resume(folder: Path, overrides: list[str]) -> float:
@@ -38,7 +38,10 @@ def resume(folder: Path, overrides: list[str]) -> float:
                 f"{key} cannot be changed when a run goes on; {allowed} can.{did_you_mean(key, MAY_CHANGE)}"
             )
     try:
-        changes = OmegaConf.from_dotlist(overrides)
+        chosen = [x for x in overrides if x.startswith("logger=")]
+        for choice in chosen:
+            stored.logger = whole_choice("logger", choice.partition("=")[2])
+        changes = OmegaConf.from_dotlist([x for x in overrides if x not in chosen])
         config = OmegaConf.merge(stored, changes, {"on_exists": "resume", "out": str(folder)})
     except OmegaConfBaseException as error:
         raise InputError(one_line(error)) from error

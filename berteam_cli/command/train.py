@@ -6,6 +6,8 @@ import logging
 import time
 from pathlib import Path
 
+from omegaconf import OmegaConf
+
 from berteam_cli import build, checkpoint
 from berteam_cli.checkpoint import Saved
 from berteam_cli.command.inspect import show
@@ -14,6 +16,8 @@ from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder
+from berteam_cli.logger.base import Once
+from berteam_cli.logger.opening import check_logger, figures_of, logger
 from berteam_cli.memory import spoken, state_bytes
 from berteam_cli.pace import Pace
 from berteam_cli.recording import Recorder, also_growing
@@ -40,6 +44,7 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
     """
     started = time.monotonic()
     folder = folder or new_folder("train")
+    check_logger(config.logger)
     parts = build.parts(config, stored=goes_on(config, folder))
     saved = resumed(config, text, folder, parts)
     if saved is None:
@@ -54,11 +59,14 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
         manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
         with manifest.until_the_end(), stoppable() as stop:
-            run, recorder = trained(config, folder, parts, saved, started, stop)
-            before = saved.seconds if saved else 0.0
-            expected = conclude(
-                config.evaluation, folder, run, recorder, manifest, lambda: before + time.monotonic() - started
-            )
+            told = OmegaConf.to_container(OmegaConf.create(text))
+            with logger(config.logger, folder, manifest.facts, told) as also:
+                run, recorder = trained(config, folder, parts, saved, started, stop, also)
+                before = saved.seconds if saved else 0.0
+                expected = conclude(
+                    config.evaluation, folder, run, recorder, manifest, lambda: before + time.monotonic() - started
+                )
+                also(run.epoch, {"elo/expected": expected})
     show(folder, 10)
     return expected
 
@@ -82,7 +90,7 @@ def resumed(config: TrainConfig, text: str, folder: Path, parts: Parts) -> Saved
 
 
 def trained(
-    config: TrainConfig, folder: Path, parts: Parts, saved: Saved | None, started: float, stop: Stop
+    config: TrainConfig, folder: Path, parts: Parts, saved: Saved | None, started: float, stop: Stop, also: Once
 ) -> tuple[Run, Recorder]:
     """Runs the epochs; returns the run after the last one, and what recorded it."""
     tables = Tables(folder, saved.table_sizes if saved else None, also_growing(parts))
@@ -91,6 +99,7 @@ def trained(
     run = saved.run if saved else begin(parts)
 
     def keep() -> None:
+        also.logger.flush()
         checkpoint.save(folder, Saved(run, tables.sizes(), seconds + time.monotonic() - started), parts)
 
     for name in END_TABLES:
@@ -102,7 +111,8 @@ def trained(
     while run.epoch < config.epochs:
         stop.in_epoch = True
         run, report = epoch(run, parts)
-        recorder.epoch(run, report)
+        state = recorder.epoch(run, report)
+        also(run.epoch, figures_of(run, report, parts, state))
         pace.tell(run.epoch, config.games_per_epoch)
         if stop.asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
             keep()

@@ -141,6 +141,12 @@ CASES = {
     ("inspect",): "required: run",
     ("inspect", ".", "--top", "0"): "--top must be >= 1",
     ("resume", "nowhere"): "nowhere is no folder of a run",
+    ("report", "nowhere"): "nowhere is no folder of a run",
+    ("report", ".", "./"): "The run . is named twice",
+    ("report", "nowhere", "compare=nobody"): "compare=nobody is no folder that berteam compare wrote",
+    ("train", "logger=tensorbord"): "logger must be one of csv, mlflow, tensorboard, wandb.*Did you mean tensorboard",
+    ("train", "logger=wandb"): r"logger=wandb needs the package wandb.*pip install 'berteam-cli\[wandb\]'",
+    ("train", "logger=mlflow"): r"logger=mlflow needs the package mlflow.*pip install 'berteam-cli\[mlflow\]'",
     ("list", "selecter"): "group must be one of .*Did you mean selector",
 }
 

@@ -1,0 +1,100 @@
+"""The tables of a report: headline figures of a run, several runs side by side, and a comparison of them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import yaml
+
+from berteam_cli.command.inspect import read_table
+from berteam_cli.report.source import Source
+
+COMPARISON = "comparison"
+COMPARED = {COMPARISON: "Algorithms compared", "pairs": "Games between the runs", "runs": "The runs compared"}
+"""Tables of `berteam compare`, and what stands above them."""
+MOST_ROWS = 60
+
+
+def headline(source: Source) -> dict[str, str]:
+    """Returns the figures that sum up a run, by name."""
+    facts: dict[str, str] = {"Status": str(source.manifest["status"])}
+    summary, timing = source.table("summary"), source.table("timing")
+    if summary is not None:
+        row = summary.iloc[0]
+        facts["Expected Elo"] = spread(row.expected_elo, row.expected_elo_low, row.expected_elo_high)
+    figures = source.evaluated("figures")
+    if figures is not None:
+        for row in figures.itertuples():
+            low, high = getattr(row, "low", math.nan), getattr(row, "high", math.nan)
+            facts[str(row.quantity).replace("_", " ")] = spread(row.value, low, high)
+    if source.elo is not None:
+        best = source.elo.iloc[0]
+        facts["Best team"] = f"{best.team} ({best.members})"
+        facts["Its Elo"] = spread(best.elo, best.elo_low, best.elo_high)
+    if timing is not None:
+        facts["Epochs"] = f"{timing.epoch.max():,}"
+    if summary is not None:
+        facts |= {"Games": f"{summary.games[0]:,}", "Time": duration(summary.wall_s[0])}
+    return facts
+
+
+def row_of(source: Source) -> dict[str, str]:
+    """Returns a run's row in the table of several."""
+    chosen = plain(source)
+    facts = {"Run": str(source.folder)}
+    facts |= {name: str(chosen.get(name.lower(), {}).get("name", "")) for name in ("Selector", "Optimizer", "Env")}
+    facts["Seed"] = str(source.manifest.get("seed", ""))
+    figures = headline(source)
+    return facts | {x: figures.get(x, "") for x in ("Status", "Epochs", "Expected Elo", "Best team", "Its Elo", "Time")}
+
+
+def plain(source: Source) -> dict[str, Any]:
+    """Returns the run's config, as far as it can be read."""
+    try:
+        read = yaml.safe_load(source.config or "")
+    except yaml.YAMLError:
+        return {}
+    return {key: value for key, value in read.items() if isinstance(value, dict)} if isinstance(read, dict) else {}
+
+
+def is_comparison(folder: Path) -> bool:
+    """Returns whether ``folder`` was written by `berteam compare`."""
+    return (folder / f"{COMPARISON}.csv").exists()
+
+
+def compared(folder: Path) -> dict[str, pd.DataFrame]:
+    """Returns the tables of a comparison by what stands above them.
+
+    Raises:
+        InputError: one cannot be read.
+    """
+    tables = {said: read_table(folder, name, columns=()) for name, said in COMPARED.items()}
+    return {said: table.head(MOST_ROWS) for said, table in tables.items() if table is not None}
+
+
+def spread(value: float, low: float, high: float) -> str:
+    """Returns a figure and its interval as they are read."""
+    if not isinstance(value, int | float) or math.isnan(value):
+        return "unknown" if not isinstance(value, str) else value
+    digits = 0 if abs(value) >= 100 else 3
+    if math.isnan(low) or math.isnan(high):
+        return f"{value:,.{digits}f}"
+    return f"{value:,.{digits}f} ({low:,.{digits}f} to {high:,.{digits}f})"
+
+
+def duration(seconds: float) -> str:
+    """Returns a time as it is said."""
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 120 else f"{minutes // 60} h {minutes % 60} min"
+
+
+def written(value: Any) -> str:
+    """Returns a cell of a table as it is read."""
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:,.4g}" if abs(value) < 1000 else f"{value:,.0f}"
+    return str(value)

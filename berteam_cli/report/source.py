@@ -1,0 +1,102 @@
+"""What a report is made from: the tables of a run, those of its evaluation, its manifest and its config."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from berteam_cli.command.inspect import read_table
+from berteam_cli.folder import CONFIG, read_manifest
+from berteam_cli.records import COLUMNS, EVALUATION
+
+STATUS = {
+    "running": "This run had not ended when the report was made, or it was killed: what follows is as far as it got.",
+    "interrupted": "This run was interrupted: what follows is as far as it got. `berteam resume` goes on with it.",
+    "failed": "This run failed: what follows is as far as it got. error.txt in its folder says why.",
+}
+FREE = {"members": ("agent", "aggression"), "regression": ("quantity", "value"), "figures": ("quantity", "value")}
+"""Tables of an evaluation that may have more columns than a report needs, and those it needs."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A run's folder, read where a plot asks for it.
+
+    Attributes:
+        folder: of the run.
+        manifest: as it stands there.
+    """
+
+    folder: Path
+    manifest: dict[str, Any]
+
+    @classmethod
+    def of(cls, folder: Path) -> Source:
+        """Returns the run in ``folder``.
+
+        Raises:
+            InputError: there is none.
+        """
+        return cls(folder, read_manifest(folder))
+
+    @property
+    def whole(self) -> bool:
+        """Whether the run has ended, so that its tables must be whole."""
+        return bool(self.manifest["status"] == "done")
+
+    @property
+    def remark(self) -> str | None:
+        """What must be said of the run before anything else."""
+        return STATUS.get(self.manifest["status"])
+
+    def table(self, name: str) -> pd.DataFrame | None:
+        """Returns a table of the run, None where there is none or it is empty.
+
+        Raises:
+            InputError: it is cut off or not such a table.
+        """
+        return filled(read_table(self.folder, name, whole=self.whole))
+
+    def evaluated(self, name: str) -> pd.DataFrame | None:
+        """Returns a table of the run's evaluation, None where there is none or it is empty.
+
+        Raises:
+            InputError: it is cut off or not such a table.
+        """
+        columns = FREE[name] if name in FREE else COLUMNS[name]
+        return filled(read_table(self.folder / EVALUATION, name, columns=columns))
+
+    @cached_property
+    def elo(self) -> pd.DataFrame | None:
+        """The rated teams, the strongest first: all of them where the run was evaluated."""
+        table = self.evaluated("elo")
+        table = self.table("elo") if table is None else table
+        return None if table is None else table.sort_values("rank", kind="stable", ignore_index=True)
+
+    @cached_property
+    def agents(self) -> pd.DataFrame | None:
+        """The members at every record."""
+        return self.table("agents")
+
+    @cached_property
+    def called(self) -> dict[int, str]:
+        """Names of the members after the last record."""
+        if self.agents is None:
+            return {}
+        last = self.agents[self.agents.epoch == self.agents.epoch.max()]
+        return dict(zip(last.agent, last["name"].astype(str), strict=True))
+
+    @cached_property
+    def config(self) -> str | None:
+        """The config as text, None where there is none."""
+        path = self.folder / CONFIG
+        return path.read_text(encoding="utf-8", errors="replace") if path.exists() else None
+
+
+def filled(table: pd.DataFrame | None) -> pd.DataFrame | None:
+    """Returns ``table``, or None where it has no rows."""
+    return None if table is None or table.empty else table
