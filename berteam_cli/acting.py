@@ -26,7 +26,7 @@ class Policies(NamedTuple):
         fixed: (K,) int16, index of the game's fixed policy; meaningless for networks.
         sizes: (K, DEEPEST + 2) int32, width of each layer from observation to actions, 0 after the last.
         tanh: (K,) bool, whether hidden layers use tanh, else ReLU.
-        epsilon: (K,) float32, chance of a uniformly random action; used by GREEDY only.
+        epsilon: (K,) float32, chance of a uniformly random action instead of the policy's own.
         weights: (K, W) float32, for each layer its matrix (in, out) row by row, then its bias; zeros behind.
     """
 
@@ -89,6 +89,11 @@ def joined(tables: list[Policies]) -> Policies:
     return Policies(*columns, weights=np.concatenate(weights))
 
 
+def noisy(policies: Policies, chance: float) -> Policies:
+    """Returns ``policies`` whose actions are uniformly random ones with so much ``chance``, in [0, 1]."""
+    return policies._replace(epsilon=np.full(len(policies.kind), chance, dtype=np.float32))
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def act(policies: Policies, k: int, observation: np.ndarray, work: np.ndarray, chance: float, choice: float) -> int:
     """Returns the action of policy ``k``, a network, on one observation.
@@ -98,7 +103,7 @@ def act(policies: Policies, k: int, observation: np.ndarray, work: np.ndarray, c
         k: row of a SAMPLED or GREEDY policy.
         observation: (O,) float32.
         work: (2 * widest layer,) float32 scratch, or longer; changed.
-        chance: in [0, 1), decides whether a GREEDY policy explores.
+        chance: in [0, 1), decides whether the action is a random one.
         choice: in [0, 1), decides which action is drawn.
     """
     sizes, weights = policies.sizes, policies.weights
@@ -120,9 +125,9 @@ def act(policies: Policies, k: int, observation: np.ndarray, work: np.ndarray, c
         x, y = y, x
         wide, at = out, bias + out
         layer += 1
+    if chance < policies.epsilon[k]:
+        return min(int(choice * wide), wide - 1)
     if policies.kind[k] == GREEDY:
-        if chance < policies.epsilon[k]:
-            return min(int(choice * wide), wide - 1)
         return highest(work, x, wide)
     return drawn(work, x, wide, choice)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from omegaconf import MISSING
 
@@ -52,10 +53,14 @@ class TrainConfig(CommandConfig):
 class TournamentConfig(CommandConfig):
     """Settings of ``berteam tournament``."""
 
-    run: str | None = MISSING
+    run: Any = MISSING
     policies: list[str] = MISSING
-    top: int = number(2)
+    fixed: bool = MISSING
+    teams: list[str] = MISSING
+    top: int = number(1)
     games_per_pair: int = number(1)
+    random_starts: bool = MISSING
+    action_noise: float = number(0, 1)
 
 
 @dataclass

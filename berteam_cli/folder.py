@@ -126,12 +126,12 @@ class Manifest:
         os.replace(part, self.folder / MANIFEST)
 
     @contextmanager
-    def until_the_end(self, resumable: bool = True, advice: str | None = None) -> Iterator[None]:
+    def until_the_end(self, resumable: bool = True, again: str = "") -> Iterator[None]:
         """Notes how what is done inside ends: done, interrupted or failed.
 
         Args:
-            resumable: whether `berteam resume` goes on from the folder's checkpoint.
-            advice: how to go on, if otherwise.
+            resumable: whether `berteam resume` goes on with it, from a checkpoint.
+            again: how else to go on, as it is told.
 
         Raises:
             RunError: it failed; the traceback is in error.txt.
@@ -140,8 +140,8 @@ class Manifest:
         (self.folder / ERROR).unlink(missing_ok=True)
 
         def go_on() -> str:
-            if advice is not None:
-                return advice
+            if again:
+                return again
             if resumable and any((self.folder / "checkpoint").glob("epoch_*")):
                 return f"Go on with: berteam resume {self.folder}"
             return "Begin anew with on_exists=overwrite."

@@ -19,7 +19,7 @@ from berteam_cli.outcomes import Ints
 COLUMNS: dict[str, tuple[str, ...]] = {
     "elo": (
         *("team", "members", "elo", "elo_low", "elo_high", "games", "wins", "draws", "losses"),
-        *("probability", "rank", "predicted_elo", "predicted_rank"),
+        *("probability", "rank", "predicted_elo", "predicted_rank", "rank_low", "rank_high"),
     ),
     "agents": (
         *("epoch", "agent", "name", "island", "algorithm", "fitness", "age", "games", "captain_games", "parent"),
@@ -47,7 +47,12 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("expected_elo", "expected_elo_low", "expected_elo_high", "best_team", "best_elo"),
         *("games", "env_steps", "wall_s", "peak_rss_mib"),
     ),
-    "pairs": ("team", "opponent", "games", "wins", "draws", "losses", "side"),
+    "pairs": ("team", "opponent", "games", "wins", "draws", "losses", "side", "superiority"),
+    "crosstable": ("team",),  # and a column for each team
+    "cycles": ("cycle", "weakest_score", "weakest_low"),
+    "strategies": (
+        *("team", "members", "alpha_rank", "alpha_rank_low", "alpha_rank_high", "nash", "nash_low", "nash_high"),
+    ),
     "reference_points": (
         *("epoch", "team", "members", "probability", "fixed_point", "replicator", "nash"),
         *("against_mix", "worst", "most_lost"),

@@ -77,7 +77,7 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
         raise InputError(f"{place} cannot be written: {error.strerror or error}.") from error
     with logging_to(place):
         manifest = Manifest.begun(place, run=str(folder), epoch=run.epoch, evaluated=far, seed=config.seed)
-        with manifest.until_the_end(advice="The same command goes on from there."):
+        with manifest.until_the_end(again="The same command goes on from there."):
             tables, facts = look.all()
             manifest.add(**facts)
             for name in TABLES:

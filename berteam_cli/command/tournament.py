@@ -1,43 +1,38 @@
-"""berteam tournament: every team against every other, of the fixed policies or of a trained run."""
+"""berteam tournament: every team against every other, of the fixed policies or of trained runs."""
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from omegaconf import OmegaConf
 
-from berteam_cli import build, checkpoint
-from berteam_cli.acting import Policies, fixed_policies
+from berteam_cli.command.entrants import players, runs_of, with_game_of
 from berteam_cli.command.inspect import show
-from berteam_cli.config import checked
 from berteam_cli.config_commands import TournamentConfig
 from berteam_cli.errors import InputError
-from berteam_cli.evaluation.reference import table_name
-from berteam_cli.evaluation.tournament import Standings
-from berteam_cli.evaluation.tournament import tournament as played
-from berteam_cli.folder import Manifest, claim, logging_to, new_folder, read_manifest
-from berteam_cli.games import Games
-from berteam_cli.outcomes import SIDES, Ints
-from berteam_cli.population import names, policies
+from berteam_cli.evaluation.certainty import Cells, cells, cycles, elo_samples, scores_of, strategies
+from berteam_cli.evaluation.playing import forget, play_all
+from berteam_cli.evaluation.tournament import Standings, counted, planned, plays_every_order
+from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
+from berteam_cli.outcomes import SIDES, Floats
+from berteam_cli.rating.bootstrap import interval, rank_intervals, superiority
+from berteam_cli.rating.copies import chancy_teams, clusters
 from berteam_cli.recording import game_rows, side_rows
 from berteam_cli.records import COLUMNS, SIDES_TABLE, team_name, team_names, write_table
-from berteam_cli.selector.base import team_count, unordered_teams
-from berteam_cli.stored import plain_config, stored_config, write_config
-from berteam_cli.training import RECORDS, generator
+from berteam_cli.stored import check_same, write_config
+from berteam_cli.training import key
 
 log = logging.getLogger("berteam")
 
-MOST_GAMES = 1_000_000  # some hours
+__all__ = ["players", "tournament"]
 
 
 def tournament(config: TournamentConfig, text: str, folder: Path | None = None) -> float:
-    """Plays as configured and writes elo.csv, pairs.csv and games.csv; returns NaN, having no figure of its own.
+    """Plays as configured and writes the tables; returns NaN, having no figure of its own.
 
     Args:
         config: checked.
@@ -48,144 +43,101 @@ def tournament(config: TournamentConfig, text: str, folder: Path | None = None) 
         InputError: the config does not go together, or the folder is not free.
         RunError: it failed.
     """
-    entry = players(config)
-    if config.run is not None:
-        text = with_game_of(Path(config.run), text)
+    entry, runs = players(config), runs_of(config)
+    if runs:
+        text = with_game_of(runs[0], text)
     folder = folder or new_folder("tournament")
-    claim(folder, config.on_exists)
-    write_config(folder, text)
-    pairs = len(entry.teams) * (len(entry.teams) - 1) // 2
+    facts = {"seed": config.seed, "teams": len(entry.teams), "pairs": len(entry.teams) * (len(entry.teams) - 1) // 2}
+    manifest = begun(folder, config, text, facts | entry.facts)
     with logging_to(folder):
         log.info("%s", folder)
-        manifest = Manifest.begun(folder, seed=config.seed, teams=len(entry.teams), pairs=pairs, **entry.facts)
-        log.info("%d teams, %d pairs, %d games each.", len(entry.teams), pairs, config.games_per_pair)
-        with manifest.until_the_end(resumable=False):
-            standings = played(entry.games, entry.policies, entry.teams, config.games_per_pair, config.seed)
-            write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, entry.names))
-            write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings))
-            write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
-            if entry.games.env.sides > 2:
-                write_table(folder / f"{SIDES_TABLE}.csv", COLUMNS[SIDES_TABLE], side_rows(0, standings.outcomes))
+        log.info("%d teams, %d pairs, %d games each.", facts["teams"], facts["pairs"], config.games_per_pair)
+        with manifest.until_the_end(again=f"Go on with the same command and out={folder} on_exists=resume."):
+            rng = np.random.default_rng(config.seed)
+            sides, pairs = entry.games.env.sides, np.triu_indices(len(entry.teams), 1)
+            plan = planned(sides, entry.teams, pairs, config.games_per_pair, rng)
+            sheet = folder / "checkpoint" / "played"
+            outcomes = play_all(entry.games, entry.policies, plan.lineups, key(rng), "Tournament", sheet)
+            standings = counted(entry.teams, plan, outcomes)
+            alike = clusters(entry.games.env, entry.policies, plan.lineups.teams)
+            copied = int((alike != np.arange(len(alike))).sum())
+            if copied:
+                log.info("%d of %d games are copies of others, and make no Elo surer.", copied, len(alike))
+            manifest.add(copies=copied)
+            chance = chancy_teams(entry.games.env, entry.policies, entry.teams)
+            known = cells(standings, alike, chance, plays_every_order(sides, entry.teams, config.games_per_pair))
+            write(folder, standings, known, entry.names, np.random.default_rng([config.seed, 1]))
+            forget(sheet)
     show(folder, 10)
     return math.nan
 
 
-@dataclass(frozen=True)
-class Entry:
-    """Who plays in a tournament.
-
-    Attributes:
-        games: the game and its threads.
-        policies: how the players act.
-        teams: (K, T) players of each team.
-        names: of the players.
-        facts: for the manifest.
-    """
-
-    games: Games
-    policies: Policies
-    teams: Ints
-    names: list[str]
-    facts: dict[str, Any]
-
-
-def players(config: TournamentConfig, overridden: Collection[str] = ()) -> Entry:
-    """Returns who plays.
-
-    Args:
-        config: checked.
-        overridden: keys that the command line gave.
+def begun(folder: Path, config: TournamentConfig, text: str, facts: dict[str, Any]) -> Manifest:
+    """Returns the manifest of a tournament that begins, or goes on, in ``folder``.
 
     Raises:
-        InputError: the config does not go together, or there is no such run.
+        InputError: the folder is not free, or holds a tournament of another config.
     """
-    if config.on_exists == "resume":
-        raise InputError("on_exists=resume is for training runs; a tournament takes error or overwrite.")
-    if config.run is None:
-        return of_fixed_policies(config)
-    for key in overridden:
-        if key.split(".", maxsplit=1)[0] in {"env", "team_size", "policies"}:
-            raise InputError(f"{key} has no effect with run={config.run}, whose game, team size and members are taken.")
-    return of_run(config)
+    if config.on_exists == "resume" and (folder / CONFIG).exists():
+        check_same(folder, text)
+        if Manifest.of(folder).facts["status"] == "done":
+            raise InputError(f"out={folder} holds this tournament already, and it is done.")
+        return Manifest.resumed(folder)
+    claim(folder, config.on_exists)
+    write_config(folder, text)
+    return Manifest.begun(folder, **facts)
 
 
-def of_fixed_policies(config: TournamentConfig) -> Entry:
-    """Returns all teams of the fixed policies.
-
-    Raises:
-        InputError: they are too many, or a policy is not the game's.
-    """
-    games = build.games(config)
-    env = games.env
-    called = config.policies or list(env.fixed_policies[: env.standard_policies])
-    build.check_policies(called, env, "policies")
-    twice = sorted({name for name in called if called.count(name) > 1})
-    if twice:
-        raise InputError(f"policies must name each policy once, but has {', '.join(twice)} more than once.")
-    said = f"policies={called} with team_size" if config.policies else "team_size"
-    check_size(team_count(len(called), config.team_size), f"{said}={config.team_size}", config)
-    return Entry(
-        games,
-        fixed_policies([env.fixed_policies.index(name) for name in called]),
-        unordered_teams(len(called), config.team_size),
-        called,
-        {} if config.policies else {"reference": table_name(env)},
+def write(folder: Path, standings: Standings, games: Cells, called: list[str], rng: np.random.Generator) -> None:
+    """Writes all tables of a tournament between players who are ``called`` so."""
+    drawn = elo_samples(standings, games, rng)
+    write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, drawn, called))
+    write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings, superiority(drawn)))
+    names = team_names(standings.teams)
+    scores = scores_of(games, len(names), games.counts.astype(float))
+    order = np.argsort(-standings.elos, kind="stable")
+    write_table(
+        folder / "crosstable.csv",
+        [*COLUMNS["crosstable"], *(names[k] for k in order)],
+        ((names[k], *(math.nan if j == k else scores[k, j] for j in order)) for k in order),
     )
+    write_table(
+        folder / "cycles.csv",
+        COLUMNS["cycles"],
+        ((" > ".join(names[k] for k in circle), *sure) for circle, *sure in cycles(games, len(names))),
+    )
+    write_table(folder / "strategies.csv", COLUMNS["strategies"], strategy_rows(standings, games, called, rng))
+    write_table(folder / "games.csv", COLUMNS["games"], game_rows(0, standings.outcomes))
+    if len(standings.results) > 2:
+        write_table(folder / f"{SIDES_TABLE}.csv", COLUMNS[SIDES_TABLE], side_rows(0, standings.outcomes))
 
 
-def with_game_of(run: Path, text: str) -> str:
-    """Returns the config ``text`` with the game and the team size of ``run``, which are what was played."""
-    config, trained = OmegaConf.create(text), plain_config(run)
-    config.env, config.team_size = trained.env, trained.team_size
-    return OmegaConf.to_yaml(config)
+def strategy_rows(
+    standings: Standings, games: Cells, called: list[str], rng: np.random.Generator
+) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of strategies.csv, who is most of alpha-rank first."""
+    found = strategies(games, len(standings.teams), rng)
+    for k in np.argsort(-found.alpha_rank[0], kind="stable"):
+        team = standings.teams[k]
+        members = " + ".join(called[m] for m in team)
+        yield team_name(team), members, *found.alpha_rank[:, k], *found.nash[:, k]
 
 
-def check_size(teams: int, said: str, config: TournamentConfig) -> None:
-    """Checks that every pair of ``teams`` teams can play.
-
-    Raises:
-        InputError: there is only one, or their games are more than MOST_GAMES; ``said`` is the setting to blame.
-    """
-    if teams < 2:
-        raise InputError(f"{said} gives {teams} team, and a tournament needs two.")
-    games = teams * (teams - 1) // 2 * config.games_per_pair
-    if games > MOST_GAMES:
-        raise InputError(f"{said} gives {teams:,} teams and {games:,} games; at most {MOST_GAMES:,} games are played.")
-
-
-def of_run(config: TournamentConfig) -> Entry:
-    """Returns the most probable teams of a trained run.
-
-    Raises:
-        InputError: there is no such run, or it has too few teams or too many.
-    """
-    folder = Path(str(config.run))
-    read_manifest(folder)
-    if config.out and Path(config.out).resolve() == folder.resolve():
-        raise InputError(f"out must be another folder than run, but both are {config.out}.")
-    trained = checked(stored_config(folder))
-    trained.workers = config.workers
-    parts = build.parts_to_read(trained)
-    run = checkpoint.load(folder, parts).run
-    acting = policies(parts.optimizer.islands, run.population, explore=False)
-    found = parts.selector.likeliest(run.selection, config.top, generator(parts.seed, RECORDS, run.epoch))
-    check_size(len(found.teams), f"top={config.top}", config)
-    called = names(parts.optimizer.islands, run.population)
-    return Entry(parts.games, acting, found.teams, called, {"run": str(folder), "epoch": run.epoch})
-
-
-def elo_rows(standings: Standings, called: list[str]) -> Iterator[tuple[Any, ...]]:
+def elo_rows(standings: Standings, drawn: Floats, called: list[str]) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of elo.csv, the strongest team first; nobody predicted anything here."""
-    won, drawn, lost = standings.record.sum(axis=2)
+    won, drew, lost = standings.record.sum(axis=2)
+    low, high = interval(drawn)
+    best, worst = rank_intervals(drawn)
     for rank, k in enumerate(np.argsort(-standings.elos, kind="stable"), start=1):
-        elo, width, team = standings.elos[k], standings.half_widths[k], standings.teams[k]
+        team = standings.teams[k]
         yield (
-            *(team_name(team), " + ".join(called[m] for m in team), elo, elo - width, elo + width),
-            *(won[k] + drawn[k] + lost[k], won[k], drawn[k], lost[k], math.nan, rank, math.nan, math.nan),
+            *(team_name(team), " + ".join(called[m] for m in team), standings.elos[k], low[k], high[k]),
+            *(won[k] + drew[k] + lost[k], won[k], drew[k], lost[k], math.nan, rank, math.nan, math.nan),
+            *(best[k], worst[k]),
         )
 
 
-def pair_rows(standings: Standings) -> Iterator[tuple[Any, ...]]:
+def pair_rows(standings: Standings, stronger: Floats) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of pairs.csv: each team against each other, apart for the side it played alone."""
     names = team_names(standings.teams)
     for k, team in enumerate(names):
@@ -193,4 +145,4 @@ def pair_rows(standings: Standings) -> Iterator[tuple[Any, ...]]:
             for color, results in zip(SIDES, standings.results, strict=False):
                 counts = results[:, k, j]
                 if counts.sum():
-                    yield team, opponent, counts.sum(), *counts, color
+                    yield team, opponent, counts.sum(), *counts, color, stronger[k, j]

@@ -229,6 +229,8 @@ def chosen(
 ) -> int:
     """Returns the action of policy ``k`` for vehicle ``v``; a network draws two numbers, even if it needs none."""
     if policies.kind[k] == FIXED:
+        if policies.epsilon[k] > 0.0 and next_uniform(state.stream, 0) < policies.epsilon[k]:
+            return min(int(next_uniform(state.stream, 0) * ACTIONS), ACTIONS - 1)
         return act_fixed(policies.fixed[k], state, 0, v, raw, rules)
     chance, choice = next_uniform(state.stream, 0), next_uniform(state.stream, 0)
     return act(policies, k, seen, work, chance, choice)

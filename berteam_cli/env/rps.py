@@ -64,6 +64,8 @@ def play_games(
             k = players[b, v]
             if policies.kind[k] == FIXED:
                 hands[v] = policies.fixed[k]
+                if policies.epsilon[k] > 0.0 and next_uniform(stream, 0) < policies.epsilon[k]:
+                    hands[v] = min(int(next_uniform(stream, 0) * len(HANDS)), len(HANDS) - 1)
             else:
                 chance, choice = next_uniform(stream, 0), next_uniform(stream, 0)
                 hands[v] = act(policies, k, seen, work, chance, choice)

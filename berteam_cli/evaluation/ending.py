@@ -127,6 +127,7 @@ def elo_rows(
             *(results.sum(), *results),
             *(chosen.probability[k], rank),
             *((predicted[k], place[k]) if exact else (math.nan, math.nan)),
+            *(math.nan, math.nan),
         )
 
 

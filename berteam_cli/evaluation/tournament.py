@@ -11,10 +11,8 @@ from numpy.random import Generator
 
 from berteam_cli.acting import Policies
 from berteam_cli.games import Games, arrangements, placed
-from berteam_cli.outcomes import Floats, Ints, Outcomes
+from berteam_cli.outcomes import Bools, Floats, Ints, Lineups, Outcomes
 from berteam_cli.rating.bradley_terry import ratings
-
-BATCH = 20_000  # games played between two looks at the clock
 
 
 @dataclass(frozen=True)
@@ -24,16 +22,19 @@ class Standings:
     Attributes:
         teams: (K, T).
         elos: (K,) with mean 1000.
-        half_widths: (K,) of their 95 % intervals.
-        results: (S, 3, K, K) games that row won, drew and lost against column, standing alone on each side; of two
-            sides both teams stand alone.
-        outcomes: of all games.
+        points: (K, K) that row made against column, standing alone; of two sides both teams stand alone.
+        results: (S, 3, K, K) games that row won, drew and lost against column, standing alone on each side.
+        pairs: (B, 2) whose game each was, the team of the smaller index first.
+        first_held: (B, S) the sides where that one stood.
+        outcomes: of all B games.
     """
 
     teams: Ints
     elos: Floats
-    half_widths: Floats
+    points: Floats
     results: Ints
+    pairs: Ints
+    first_held: Bools
     outcomes: Outcomes
 
     @property
@@ -43,6 +44,26 @@ class Standings:
         if len(self.results) == 2:
             return alone
         return alone + alone[::-1].transpose(0, 2, 1)
+
+    @property
+    def games(self) -> Ints:
+        """(K, K) games in which row stood alone against column."""
+        return self.results.sum(axis=(0, 1))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Games to play.
+
+    Attributes:
+        lineups: of B games.
+        pairs: (B, 2) indices of the two teams of each.
+        first_held: (B, S) the sides where the first one stands.
+    """
+
+    lineups: Lineups
+    pairs: Ints
+    first_held: Bools
 
 
 def tournament(games: Games, policies: Policies, teams: Ints, games_per_pair: int, seed: int) -> Standings:
@@ -57,27 +78,34 @@ def tournament(games: Games, policies: Policies, teams: Ints, games_per_pair: in
         games_per_pair: in turn as ``games.arrangements`` says, the team of the smaller index alone on side 0 first.
         seed: of the policies that act at random and, where not all are played, of the orders of the members.
     """
-    sides = games.env.sides
     rng = np.random.default_rng(seed)
-    ways = arrangements(sides)
-    first, second = np.triu_indices(len(teams), 1)
+    plan = planned(games.env.sides, teams, np.triu_indices(len(teams), 1), games_per_pair, rng)
+    outcomes, _ = games.play(policies, plan.lineups, int(rng.integers(2**63)))
+    return counted(teams, plan, outcomes)
+
+
+def planned(sides: int, teams: Ints, pairs: tuple[Ints, Ints], games_per_pair: int, rng: Generator) -> Plan:
+    """Returns ``games_per_pair`` games in a row of each of ``pairs`` of ``teams``; ``rng`` draws orders of members."""
+    ways, (first, second) = arrangements(sides), pairs
     ours, theirs = schedule(teams, first, second, games_per_pair, len(ways), rng)
     held = np.tile(ways[np.arange(games_per_pair) % len(ways)], (len(first), 1))
-    outcomes, _ = games.play(policies, placed(ours, theirs, held), int(rng.integers(2**63)))
+    return Plan(placed(ours, theirs, held), np.repeat(np.stack([first, second], axis=1), games_per_pair, axis=0), held)
 
+
+def counted(teams: Ints, plan: Plan, outcomes: Outcomes) -> Standings:
+    """Returns the standings of ``teams`` (K, T) after the games of ``plan``."""
+    sides = outcomes.scores.shape[1]
     results = np.zeros((sides, 3, len(teams), len(teams)), dtype=np.int64)
     points = np.zeros((len(teams), len(teams)))
-    of_game = np.repeat(np.arange(len(first)), games_per_pair)
-    for row, column, ours_held in ((first, second, held), (second, first, ~held)):
-        alone = np.flatnonzero(ours_held.sum(axis=1) == 1)
-        side = ours_held[alone].argmax(axis=1)
+    for (row, column), held in ((plan.pairs.T, plan.first_held), (plan.pairs.T[::-1], ~plan.first_held)):
+        alone = np.flatnonzero(held.sum(axis=1) == 1)
+        side = held[alone].argmax(axis=1)
         scored = outcomes.scores[alone, side]
         result = np.where(scored == 1.0, 0, np.where(scored > 0.0, 1, 2))  # won, drawn, lost
-        i, j = row[of_game[alone]], column[of_game[alone]]
-        np.add.at(results, (side, result, i, j), 1)
-        np.add.at(points, (i, j), scored)
-    elos, half_widths = ratings(points, results.sum(axis=(0, 1)).astype(float), math.log(sides - 1))
-    return Standings(teams, elos, half_widths, results, outcomes)
+        np.add.at(results, (side, result, row[alone], column[alone]), 1)
+        np.add.at(points, (row[alone], column[alone]), scored)
+    elos, _ = ratings(points, results.sum(axis=(0, 1)).astype(float), math.log(sides - 1))
+    return Standings(teams, elos, points, results, plan.pairs, plan.first_held, outcomes)
 
 
 def schedule(
@@ -99,6 +127,11 @@ def schedule(
     ours = np.take_along_axis(np.repeat(teams[first][:, np.newaxis], games_per_pair, axis=1), chosen[:, :, 0], axis=2)
     theirs = np.take_along_axis(np.repeat(teams[second][:, np.newaxis], games_per_pair, axis=1), chosen[:, :, 1], 2)
     return ours.reshape(-1, size), theirs.reshape(-1, size)
+
+
+def plays_every_order(sides: int, teams: Ints, games_per_pair: int) -> bool:
+    """Returns whether so many games a pair have the members of ``teams`` (K, T) in every order, from every side."""
+    return factorial_pairs(teams.shape[1]) <= games_per_pair // len(arrangements(sides))
 
 
 def factorial_pairs(size: int) -> float:

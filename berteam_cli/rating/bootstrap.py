@@ -1,221 +1,272 @@
-"""How sure Elos are: the games are drawn anew, many times, and the players rated each time (bootstrap).
+"""How sure Elos are: the games of a tournament are drawn anew, many times, and everything is fitted again.
 
-Every game comes as often as a Poisson draw of mean 1 says, whoever played it: drawing anew only within each pair of
-players, who may have met twice, would halve the scatter. What the prior weighs is drawn too (exponential, of its own
-mean), so that a perfect record, which drawing anew never breaks, has an interval nevertheless.
+Every game is drawn Poisson(1) times in a resample, independently of all others. Drawing within each pair of
+teams instead would make the variance (n - 1) / n of what it is: a half with two games a pair.
+
+What the prior weighs is drawn too (exponential, of its own mean): a perfect record, which drawing games anew never
+breaks, has an interval nevertheless.
+
+Games that are copies of each other (``rating.copies``) must be drawn together, or the intervals are too narrow.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.random import Generator
-from scipy.linalg import cho_factor, cho_solve
 
 from berteam_cli.outcomes import Floats, Ints
-from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, expected, held_ratings, ratings
+from berteam_cli.rating.bradley_terry import PRIOR_DRAWS
 from berteam_cli.rating.elo import nats, points
 
+CONFIDENCE = 0.95
 RESAMPLES = 1000
-MOST_REFITTED = 200  # players of a tournament; refitting takes the cube of their number, a thousand times
-ARRIVED_NAT = 1e-7  # step at which a fit has arrived
-LONGEST_STEP_NAT = 2.0
-STEPS = 60  # at most
-FARTHEST_NAT = 40.0
+TOLERANCE = 1e-6  # of a strength in nats: 0.0002 Elo
+FEW = 12  # games of one kind, up to which drawing by a table is faster
+LONGEST_STEP = 1.0  # of Newton's method, in nats: where the slope changes little
 
 
 def held_samples(
     wins: Ints, draws: Ints, losses: Ints, anchors: Floats, rng: Generator, resamples: int = RESAMPLES
 ) -> Floats:
-    """Returns (R, K) Elos of K players who met J anchors only, each row after other games were drawn.
+    """Returns (R, K) Elos of players who met only opponents of known Elo, one row for each resample of their games.
 
     Args:
-        wins: (K, J) games that player k won against anchor j, between two sides.
-        draws: (K, J) games that were drawn.
-        losses: (K, J) games that it lost.
-        anchors: (J,) Elos, held.
-        rng: the only source of chance.
+        wins: (K, J) games that player k won against anchor j.
+        draws: (K, J) games drawn.
+        losses: (K, J) games lost.
+        anchors: (J,) Elo of the anchors, held.
+        rng: draws the games.
         resamples: R.
     """
-    made, played = wins + 0.5 * draws, (wins + draws + losses).astype(float)
-    best = nats(held_ratings(made, played, anchors)[0])
     counts = np.stack([wins, draws, losses], axis=2).astype(np.float64)
-    held = np.asarray(nats(np.asarray(anchors, dtype=float)), dtype=np.float64)
-    samples = _held(counts, held, np.asarray(best, dtype=np.float64), resamples, rng)
-    return np.ascontiguousarray(points(samples).T)
+    held = np.asarray(nats(np.asarray(anchors, dtype=np.float64)), dtype=np.float64)
+    return np.asarray(points(held_strengths(counts, held, rng, resamples)))
+
+
+def samples(
+    wins: Ints, draws: Ints, losses: Ints, rng: Generator, resamples: int = RESAMPLES, start: Floats | None = None
+) -> Floats:
+    """Returns (R, K) Elos of all players of a tournament between two sides, with mean 1000 in each resample.
+
+    Args:
+        wins: (K, K) games that row won against column; the transpose of ``losses``.
+        draws: (K, K) games drawn, symmetric.
+        losses: (K, K) games lost.
+        rng: draws the games.
+        resamples: R.
+        start: (K,) Elos near which to look, such as the point estimates; None looks from equal ones.
+    """
+    first, second = np.triu_indices(len(wins), 1)
+    counts = np.concatenate([wins[first, second], draws[first, second], losses[first, second]])
+    scored = np.repeat([1.0, 0.5, 0.0], len(first))
+    return cell_samples(np.tile(first, 3), np.tile(second, 3), scored, counts, len(wins), rng, resamples, start=start)
+
+
+def cell_samples(
+    alone: Ints,
+    others: Ints,
+    scored: Floats,
+    counts: Ints,
+    players: int,
+    rng: Generator,
+    resamples: int = RESAMPLES,
+    handicap: float = 0.0,
+    start: Floats | None = None,
+    copies: Ints | None = None,
+) -> Floats:
+    """Returns (R, K) Elos with mean 1000, of games listed by who played and what came of it.
+
+    Each resample is fitted to the end by Newton's method, from the fit before. That takes K^3 steps: a second for 28
+    players, and minutes for a thousand.
+
+    Args:
+        alone: (C,) the player that stood alone on its side; of two sides, either.
+        others: (C,) the player that held the others.
+        scored: (C,) what ``alone`` made, in [0, 1].
+        counts: (C,) games of that kind.
+        players: K.
+        rng: draws the games.
+        resamples: R.
+        handicap: in nats, of who stands alone, as in ``bradley_terry.ratings``.
+        start: (K,) Elos near which to look.
+        copies: (C,) of how many copies each of these games stands for, which are drawn together; None: one.
+    """
+    some = counts > 0
+    weights = np.ones(int(some.sum())) if copies is None else np.asarray(copies, dtype=np.float64)[some]
+    alone, others, scored = alone[some], others[some], np.asarray(scored, dtype=np.float64)[some]
+    kept = np.asarray(counts, dtype=np.float64)[some]
+    strengths = np.zeros(players) if start is None else np.asarray(nats(np.asarray(start, dtype=np.float64)))
+    return np.asarray(points(free_strengths(alone, others, scored, kept, weights, handicap, strengths, rng, resamples)))
+
+
+def chances_of_few() -> Floats:
+    """Returns (FEW + 1, 60) the chance that a Poisson number of mean row is at most column."""
+    means, numbers = np.arange(FEW + 1.0)[:, np.newaxis], np.arange(60)
+    factorials = np.array([float(math.factorial(k)) for k in numbers])
+    return np.cumsum(np.exp(-means) * means**numbers / factorials, axis=1)
+
+
+AT_MOST = chances_of_few()
 
 
 @njit(cache=True, nogil=True)
-def _held(counts: Floats, held: Floats, best: Floats, resamples: int, rng: Generator) -> Floats:
-    """Returns (K, R) strengths in nats; see ``held_samples``.
+def times(games: float, rng: Generator) -> float:
+    """Returns how often a resample has a kind of which there are so many ``games``: Poisson."""
+    if games > FEW:
+        return float(rng.poisson(games))
+    row, chance, number = int(games), rng.random(), 0
+    while number < AT_MOST.shape[1] - 1 and chance >= AT_MOST[row, number]:
+        number += 1
+    return float(number)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def free_strengths(
+    alone: np.ndarray,
+    others: np.ndarray,
+    scored: np.ndarray,
+    counts: np.ndarray,
+    copies: np.ndarray,
+    handicap: float,
+    start: np.ndarray,
+    rng: Generator,
+    resamples: int,
+) -> np.ndarray:
+    """Returns (R, K) strengths in nats with mean 0; the arguments are those of ``cell_samples``."""
+    players = len(start)
+    found = np.empty((resamples, players))
+    strengths = start
+    for r in range(resamples):
+        prior = rng.exponential(PRIOR_DRAWS, players)
+        games, made = np.zeros((players, players)), 0.5 * prior
+        for c in range(len(counts)):
+            drawn = times(counts[c], rng) * copies[c]
+            games[alone[c], others[c]] += drawn
+            made[alone[c]] += drawn * scored[c]
+            made[others[c]] += drawn * (1.0 - scored[c])
+        strengths = fitted(games, made, prior, handicap, strengths)
+        found[r] = strengths - strengths.mean()
+    return found
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def held_strengths(counts: np.ndarray, held: np.ndarray, rng: Generator, resamples: int) -> np.ndarray:
+    """Returns (R, K) strengths in nats.
 
     Args:
-        counts: (K, J, 3) games won, drawn and lost.
-        held: (J,) strengths of the anchors.
-        best: (K,) strengths to start from.
+        counts: (K, J, 3) float64 games won, drawn and lost.
+        held: (J,) strengths of the anchors, nats.
+        rng: draws the games.
         resamples: R.
-        rng: the only source of chance.
     """
     players, anchors, _ = counts.shape
-    samples = np.empty((players, resamples))
-    played = np.empty(anchors)
+    found = np.empty((resamples, players))
+    games = np.empty(anchors)
     for k in range(players):
+        strength = 0.0
         for r in range(resamples):
-            made = 0.0
-            for j in range(anchors):
-                played[j] = 0.0
-                for result in range(3):
-                    if counts[k, j, result] > 0:
-                        drawn = rng.poisson(counts[k, j, result])
-                        played[j] += drawn
-                        made += drawn * (1.0 - 0.5 * result)
             prior = rng.exponential(PRIOR_DRAWS)
-            samples[k, r] = _solved(played, made + 0.5 * prior, prior, held, best[k])
-    return samples
+            made = 0.5 * prior
+            for j in range(anchors):
+                games[j] = 0.0
+                for result in range(3):
+                    if counts[k, j, result] > 0.0:
+                        drawn = times(counts[k, j, result], rng)
+                        games[j] += drawn
+                        made += drawn * (1.0 - 0.5 * result)
+            strength = root(games, held, made, prior, strength)
+            found[r, k] = strength
+    return found
 
 
-@njit(cache=True, nogil=True)
-def _solved(played: Floats, made: float, prior: float, held: Floats, start: float) -> float:
-    """Returns the strength whose expected points are those ``made``: Newton's steps, kept in a bracket."""
-    low, high = start - FARTHEST_NAT, start + FARTHEST_NAT
-    strength = start
-    for _ in range(STEPS):
-        chance = 0.5 * (1.0 + np.tanh(0.5 * strength))
-        excess, slope = prior * chance - made, prior * chance * (1.0 - chance)
+@njit(cache=True, nogil=True, error_model="numpy")
+def root(games: np.ndarray, held: np.ndarray, made: float, prior: float, start: float) -> float:
+    """Returns the strength whose expected points in ``games`` (J,) against ``held`` (J,) are ``made``, in nats.
+
+    ``prior`` draws against an average player are among them.
+
+    Newton's method from ``start``, and halving where it would leave what encloses the answer.
+    """
+    low, high = held.min() - 40.0, held.max() + 40.0
+    strength = min(max(start, low), high)
+    for _ in range(200):
+        chance = 1.0 / (1.0 + np.exp(-strength))
+        over = prior * chance - made
+        slope = prior * chance * (1.0 - chance)
         for j in range(len(held)):
-            if played[j] > 0:
-                chance = 0.5 * (1.0 + np.tanh(0.5 * (strength - held[j])))
-                excess += played[j] * chance
-                slope += played[j] * chance * (1.0 - chance)
-        if excess > 0:
+            if games[j] > 0.0:
+                chance = 1.0 / (1.0 + np.exp(held[j] - strength))
+                over += games[j] * chance
+                slope += games[j] * chance * (1.0 - chance)
+        if over > 0.0:
             high = strength
         else:
             low = strength
-        after = strength - excess / max(slope, 1e-300)
+        after = strength - over / slope
         if not low < after < high:
             after = 0.5 * (low + high)
-        step = abs(after - strength)
+        if abs(after - strength) < TOLERANCE:
+            return after
         strength = after
-        if step < ARRIVED_NAT:
-            break
     return strength
 
 
-def samples(wins: Ints, draws: Ints, rng: Generator, resamples: int = RESAMPLES) -> Floats:
-    """Returns (R, K) Elos of the players of a tournament, with mean 1000, each row after other games were drawn.
-
-    Above MOST_REFITTED players the rows are drawn from the normal distribution to which that tends as games get more:
-    its covariance is that of the points, from the residuals of the games, between two inverses of their information.
+@njit(cache=True, nogil=True, error_model="numpy")
+def fitted(games: np.ndarray, made: np.ndarray, prior: np.ndarray, handicap: float, start: np.ndarray) -> np.ndarray:
+    """Returns (K,) the strengths at which everyone is expected to make what it made, in nats.
 
     Args:
-        wins: (K, K) games that row won against column.
-        draws: (K, K) games that they drew; symmetric.
-        rng: the only source of chance.
-        resamples: R.
-    """
-    wins, draws = wins.astype(np.float64), draws.astype(np.float64)
-    best = nats(ratings(wins + 0.5 * draws, wins + wins.T + draws)[0])
-    if len(wins) <= MOST_REFITTED:
-        drawn = _refitted(wins, draws, best, resamples, rng)
-    else:
-        drawn = _in_the_limit(wins, draws, best, resamples, rng)
-    return points(drawn - drawn.mean(axis=1, keepdims=True))
-
-
-@njit(cache=True, nogil=True)
-def _refitted(wins: Floats, draws: Floats, best: Floats, resamples: int, rng: Generator) -> Floats:
-    """Returns (R, K) strengths in nats, not centred; see ``samples``."""
-    players = len(best)
-    fitted = np.empty((resamples, players))
-    for r in range(resamples):
-        played, made = np.zeros((players, players)), np.zeros(players)
-        prior = rng.exponential(PRIOR_DRAWS, players)
-        for i in range(players):
-            made[i] += 0.5 * prior[i]
-            for j in range(i + 1, players):
-                won = rng.poisson(wins[i, j]) if wins[i, j] > 0 else 0
-                lost = rng.poisson(wins[j, i]) if wins[j, i] > 0 else 0
-                drawn = rng.poisson(draws[i, j]) if draws[i, j] > 0 else 0
-                played[i, j] = won + lost + drawn
-                made[i] += won + 0.5 * drawn
-                made[j] += lost + 0.5 * drawn
-        fitted[r] = _fit(played, made, prior, best)
-    return fitted
-
-
-@njit(cache=True, nogil=True)
-def _fit(played: Floats, made: Floats, prior: Floats, start: Floats) -> Floats:
-    """Returns (K,) the strengths whose expected points are those ``made``, by Newton's steps, none too long.
-
-    Args:
-        played: (K, K) games of row and column, above the diagonal.
-        made: (K,) points, the prior's included.
+        games: (K, K) float64 games that row played alone against column, each once.
+        made: (K,) points, those of the prior included.
         prior: (K,) draws against an average player.
-        start: (K,) strengths.
+        handicap: of who stands alone, nats.
+        start: (K,) where to begin.
     """
-    players = len(start)
+    players = len(made)
     strengths = start.copy()
-    for _ in range(STEPS):
-        information, missing = np.zeros((players, players)), made.copy()
+    for _ in range(100):
+        over = -made.copy()
+        curvature = np.zeros((players, players))
         for i in range(players):
-            chance = 0.5 * (1.0 + np.tanh(0.5 * strengths[i]))
-            missing[i] -= prior[i] * chance
-            information[i, i] += prior[i] * chance * (1.0 - chance) + 1e-12
-            for j in range(i + 1, players):
-                games = played[i, j]
-                if games > 0:
-                    chance = 0.5 * (1.0 + np.tanh(0.5 * (strengths[i] - strengths[j])))
-                    missing[i] -= games * chance
-                    missing[j] -= games * (1.0 - chance)
-                    weight = games * chance * (1.0 - chance)
-                    information[i, i] += weight
-                    information[j, j] += weight
-                    information[i, j] -= weight
-                    information[j, i] -= weight
-        step = np.linalg.solve(information, missing)
+            chance = 1.0 / (1.0 + np.exp(-strengths[i]))
+            over[i] += prior[i] * chance
+            curvature[i, i] += prior[i] * chance * (1.0 - chance)
+            for j in range(players):
+                if i != j and games[i, j] > 0.0:
+                    chance = 1.0 / (1.0 + np.exp(strengths[j] + handicap - strengths[i]))
+                    bent = games[i, j] * chance * (1.0 - chance)
+                    over[i] += games[i, j] * chance
+                    over[j] += games[i, j] * (1.0 - chance)
+                    curvature[i, i] += bent
+                    curvature[j, j] += bent
+                    curvature[i, j] -= bent
+                    curvature[j, i] -= bent
+        step = np.linalg.solve(curvature, over)
         longest = np.abs(step).max()
-        strengths += step if longest <= LONGEST_STEP_NAT else step * (LONGEST_STEP_NAT / longest)
-        if longest < ARRIVED_NAT:
+        strengths = strengths - step * min(1.0, LONGEST_STEP / max(longest, TOLERANCE))
+        if longest < TOLERANCE:
             break
     return strengths
 
 
-def _in_the_limit(wins: Floats, draws: Floats, best: Floats, resamples: int, rng: Generator) -> Floats:
-    """Returns (R, K) strengths in nats, not centred; see ``samples``."""
-    chance = expected(best[:, np.newaxis], best)
-    played = wins + wins.T + draws
-    scattered = wins * (1 - chance) ** 2 + wins.T * chance**2 + draws * (0.5 - chance) ** 2
-    information = laplacian(played * chance * (1 - chance)) + np.eye(len(best)) * PRIOR_DRAWS / 4
-    covariance = laplacian(scattered) + np.eye(len(best)) * PRIOR_DRAWS**2 / 4
-    factor = np.linalg.cholesky(covariance + np.eye(len(best)) * 1e-9)
-    noise = factor @ rng.standard_normal((len(best), resamples))
-    return best + cho_solve(cho_factor(information), noise).T
-
-
-def laplacian(weights: Floats) -> Floats:
-    """Returns the graph Laplacian of symmetric ``weights``; their diagonal is ignored."""
-    off = np.where(np.eye(len(weights), dtype=bool), 0.0, weights)
-    return np.diag(off.sum(axis=1)) - off
-
-
-def interval(drawn: Floats, axis: int = 0) -> tuple[Floats, Floats]:
-    """Returns the ends of the 95 % intervals of resampled values along ``axis``."""
-    low, high = np.quantile(drawn, [0.025, 0.975], axis=axis)
+def interval(samples: Floats, axis: int = 0) -> tuple[Floats, Floats]:
+    """Returns the ends of the middle 95 % of ``samples`` along ``axis``."""
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low, high = np.quantile(samples, [tail, 1.0 - tail], axis=axis)
     return low, high
 
 
-def superiority(drawn: Floats) -> Floats:
-    """Returns (K, K) the likelihood that row is stronger than column, a tie counting half; ``drawn`` is (R, K)."""
-    count = drawn.shape[1]
-    above = np.empty((count, count))
-    for k in range(count):
-        gap = drawn[:, [k]] - drawn
-        above[k] = (gap > 0).mean(axis=0) + 0.5 * (gap == 0).mean(axis=0)
-    return above
+def superiority(samples: Floats) -> Floats:
+    """Returns (K, K) in which share of the (R, K) ``samples`` row is stronger than column; ties are a half."""
+    return np.stack([0.5 + 0.5 * np.sign(own[:, np.newaxis] - samples).mean(axis=0) for own in samples.T])
 
 
-def rank_intervals(drawn: Floats) -> tuple[Ints, Ints]:
-    """Returns (K,) the best and the worst rank, from 1, of each player's 95 % interval; ``drawn`` is (R, K)."""
-    ranks = np.argsort(np.argsort(-drawn, axis=1, kind="stable"), axis=1) + 1
-    low, high = np.quantile(ranks, [0.025, 0.975], axis=0, method="inverted_cdf")
-    return low.astype(np.int64), high.astype(np.int64)
+def rank_intervals(samples: Floats) -> tuple[Ints, Ints]:
+    """Returns (K,) the ends of the middle 95 % of each player's rank in (R, K) ``samples``; 1 is the strongest."""
+    ranks = np.argsort(np.argsort(-samples, axis=1, kind="stable"), axis=1, kind="stable") + 1
+    tail = 0.5 * (1.0 - CONFIDENCE)
+    low = np.quantile(ranks, tail, axis=0, method="lower")
+    return low, np.quantile(ranks, 1.0 - tail, axis=0, method="higher")

@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pandas as pd
 
@@ -49,7 +51,7 @@ def test_a_trained_run_and_inspect(berteam, tmp_path):
     assert (elo.games == 4 * 3).all()
     last = read(tmp_path / "run", "team_distribution").query("epoch == 4").nlargest(5, "probability")
     assert set(elo.team) == set(last.team)
-    shown = berteam("inspect", "run", "top=3").stdout
+    shown = berteam("inspect", "run", "--top", "3").stdout
     assert "Most probable teams after epoch 4" in " ".join(shown.split())
     assert "done" in shown
     assert "Strongest of 5" in berteam("inspect", "t").stdout
@@ -77,3 +79,66 @@ def test_every_order_of_the_members_from_both_sides(berteam, tmp_path):
     games = read(tmp_path / "t", "games")
     assert len(games) == 3024
     assert np.isclose(games.groupby(["blue", "red"]).size(), 4).all()
+
+
+HANDS = ("tournament", "env=rps", "team_size=1")
+
+
+def test_rock_paper_scissors_shows_its_circle(berteam, tmp_path):
+    """A circle, a Nash of thirds and an alpha-rank of thirds; all of it known after two games a pair."""
+    berteam(*HANDS, "games_per_pair=2", "out=t")
+    assert (tmp_path / "t" / "cycles.csv").read_text() == "cycle,weakest_score,weakest_low\n0 > 2 > 1,1.0,1.0\n"
+    strategies = read(tmp_path / "t", "strategies")
+    for column in ("nash", "nash_low", "nash_high", "alpha_rank", "alpha_rank_low", "alpha_rank_high"):
+        assert np.allclose(strategies[column], 1 / 3)
+    table = pd.read_csv(tmp_path / "t" / "crosstable.csv", dtype={"team": str}, index_col="team")
+    assert table.loc["0", "2"] == table.loc["1", "0"] == table.loc["2", "1"] == 1.0
+    assert np.allclose((table + table.T).to_numpy()[~np.eye(3, dtype=bool)], 1.0)
+    elo = read(tmp_path / "t", "elo")
+    assert (elo.rank_low == 1).all()
+    assert (elo.rank_high == 3).all()
+    pairs = read(tmp_path / "t", "pairs").set_index(["team", "opponent", "side"]).superiority
+    assert np.isclose(pairs["0", "1", "blue"] + pairs["1", "0", "blue"], 1.0)
+
+
+def test_copies_make_no_interval_narrower(berteam, tmp_path):
+    for games in (2, 40):
+        berteam(*HANDS, f"games_per_pair={games}", f"out=t{games}")
+    two, forty = (read(tmp_path / f"t{games}", "elo") for games in (2, 40))
+    assert ((forty.elo_high - forty.elo_low) > 0.9 * (two.elo_high - two.elo_low)).all()
+    berteam(*HANDS, "games_per_pair=40", "action_noise=0.5", "out=noisy")
+    noisy = read(tmp_path / "noisy", "elo")
+    assert (noisy.elo_high - noisy.elo_low).max() < (two.elo_high - two.elo_low).min()
+
+
+def test_a_list_of_teams_and_action_noise_are_the_same_every_time(berteam, tmp_path):
+    for k in (1, 2):
+        berteam("tournament", "teams=[2-5,0-3]", "env.max_time_s=30", "action_noise=0.3", f"workers={k}", f"out=t{k}")
+    assert set(read(tmp_path / "t1", "elo").team) == {"2-5", "0-3"}
+    assert (tmp_path / "t1" / "games.csv").read_bytes() == (tmp_path / "t2" / "games.csv").read_bytes()
+
+
+def test_teams_of_two_runs_and_fixed_ones(berteam, tmp_path):
+    for seed in (1, 2):
+        berteam("train", "population=hands", "env=rps", "epochs=1", f"seed={seed}", f"out=r{seed}")
+    berteam("tournament", "run=[r1,r2]", "top=2", "fixed=true", "games_per_pair=2", "out=t")
+    elo = read(tmp_path / "t", "elo")
+    assert elo.members.str.contains("r1/").sum() == elo.members.str.contains("r2/").sum() == 2
+    assert len(elo) > 4
+
+
+def test_a_cut_tournament_goes_on(berteam, tmp_path):
+    """Cut off after the first batch, it ends with the same bytes; another config is refused."""
+    words = (*HANDS, "games_per_pair=1000", "action_noise=0.2")
+    berteam(*words, "out=whole")
+    whole = tmp_path / "whole"
+    cut = tmp_path / "cut"
+    berteam(*words, "out=cut")
+    manifest = json.loads((cut / "manifest.json").read_text())
+    (cut / "manifest.json").write_text(json.dumps(manifest | {"status": "interrupted"}))
+    for name in ("elo", "games", "pairs"):
+        (cut / f"{name}.csv").unlink()
+    assert "begun with" in berteam(*words, "seed=5", "out=cut", "on_exists=resume", code=2).stderr
+    berteam(*words, "out=cut", "on_exists=resume")
+    for name in ("elo", "games", "pairs", "strategies", "cycles"):
+        assert (cut / f"{name}.csv").read_bytes() == (whole / f"{name}.csv").read_bytes()
