@@ -173,7 +173,7 @@ class Look:
         tables["figures"] = self.dated(figures(found, learned, fresh, rng))
         self.show("Figures", tables, "figures", whole=True)
         if exact and len(truth.elos) >= FEWEST:
-            fitted = regression(truth.elos, truth.chosen.probability, found.samples.var(axis=0), rng)
+            fitted = regression(truth.elos, truth.chosen.probability, found.noise, rng)
             tables["regression"] = self.dated((name, *value) for name, value in fitted.items())
             self.show("Probability of a team on its Elo", tables, "regression", whole=True)
         if exact:

@@ -13,7 +13,7 @@ from berteam_cli.env.mctf import Mctf
 from berteam_cli.evaluation.manners import Manners, manners
 from berteam_cli.evaluation.playing import play_all
 from berteam_cli.evaluation.reference import Reference
-from berteam_cli.evaluation.truth import Chosen, Fixture, Truth, elo_samples, fixture, rated
+from berteam_cli.evaluation.truth import Chosen, Fixture, Truth, elo_samples, fixture, rated, replay_variance
 from berteam_cli.games import Games, as_side_0
 from berteam_cli.outcomes import Floats, Outcomes
 from berteam_cli.rating.bradley_terry import Z_95
@@ -27,11 +27,14 @@ class Strength:
     Attributes:
         truth: the Elos; the half widths are those of a normal distribution that scatters as ``samples`` do.
         samples: (R, K) Elos after drawing the games anew.
+        noise: (K,) variance of each Elo over repetitions of the same games; among more than two sides, and where pairs
+            met only once, that of ``samples``, which is larger.
         manners: how the teams behaved; None in games that count no events.
     """
 
     truth: Truth
     samples: Floats
+    noise: Floats
     manners: Manners | None
 
 
@@ -70,7 +73,10 @@ class Match:
         found = rated(chosen, self.reference, matches, outcomes)
         samples = elo_samples(found, self.reference, self.games.env.sides, drawing)
         behaved = self.observed(matches, outcomes) if self.counts_events else None
-        return Strength(replace(found, half_widths=Z_95 * samples.std(axis=0)), samples, behaved)
+        noise = samples.var(axis=0)
+        if self.games.env.sides == 2 and games_per_pair > 1:
+            noise = replay_variance(found, self.reference)
+        return Strength(replace(found, half_widths=Z_95 * samples.std(axis=0)), samples, noise, behaved)
 
     def of_members(self, games_per_pair: int, rng: Generator, sheet: Path) -> Manners:
         """Returns how each member behaves, as a team made only of it; the game counts events."""

@@ -18,8 +18,8 @@ from berteam_cli.evaluation.tournament import schedule
 from berteam_cli.games import Games, arrangements, placed
 from berteam_cli.outcomes import Bools, Floats, Ints, Lineups, Outcomes
 from berteam_cli.rating.bootstrap import RESAMPLES, held_samples
-from berteam_cli.rating.bradley_terry import Z_95, held_ratings
-from berteam_cli.rating.elo import points
+from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, Z_95, expected, held_ratings
+from berteam_cli.rating.elo import POINTS_PER_NAT, nats, points
 from berteam_cli.selector.base import TeamDistribution
 from berteam_cli.training import key
 
@@ -256,3 +256,24 @@ def elo_samples(found: Truth, reference: Reference, sides: int, rng: Generator) 
     if sides == 2:
         return held_samples(*found.results, reference.elos, rng)
     return found.elos + found.half_widths / Z_95 * rng.standard_normal((RESAMPLES, len(found.elos)))
+
+
+def replay_variance(found: Truth, reference: Reference) -> Floats:
+    """Returns (K,) the variance of each Elo over repetitions of the same games, NaN where a pair met only once.
+
+    From how the scores against one opponent scatter around their own mean. Games drawn anew (``elo_samples``) scatter
+    more: they also differ in who was met how often, and where a team fares better against some opponents and worse
+    against others than two Elos can say, that counts as noise.
+
+    Args:
+        found: Elos from games of two sides.
+        reference: whom they met.
+    """
+    won, drawn, _ = found.results
+    games = found.results.sum(axis=0).astype(float)
+    made = won + 0.5 * drawn
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scatter = (won + 0.25 * drawn - made**2 / games) * games / (games - 1)
+    chances = expected(nats(found.elos)[:, np.newaxis], nats(reference.elos))
+    information = (games * chances * (1 - chances)).sum(axis=1) + PRIOR_DRAWS / 4
+    return (POINTS_PER_NAT / information) ** 2 * scatter.sum(axis=1)

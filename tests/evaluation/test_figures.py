@@ -27,7 +27,7 @@ def measured(probability, seed, error=GAMES_ERROR):
     chosen = Chosen(TEAMS, probability, np.ones(count, bool), np.zeros(count, int), 1.0)
     elos = TRUE + rng.normal(0, error, count)
     truth = Truth(chosen, elos, np.full(count, Z_95 * error), np.zeros((3, count, 1), int))
-    return Strength(truth, elos + rng.normal(0, error, (1000, count)), None)
+    return Strength(truth, elos + rng.normal(0, error, (1000, count)), np.full(count, error**2), None)
 
 
 def judged(probability, seed, error=GAMES_ERROR):

@@ -4,9 +4,9 @@ import pytest
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
 from berteam_cli.evaluation.reference import Reference, reference
-from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, fixture, truth
+from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, fixture, replay_variance, truth
 from berteam_cli.games import Games
-from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, expected
+from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, expected, held_ratings
 from berteam_cli.rating.elo import nats
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
 from berteam_cli.workers import Workers
@@ -127,6 +127,22 @@ def test_the_fixed_teams_get_their_own_elos_back():
     made = (found.results[0] + 0.5 * found.results[1]).sum(axis=1)
     missing = made - (2 * expected(strengths, held)).sum(axis=1)
     np.testing.assert_allclose(missing, PRIOR_DRAWS * (expected(strengths[:, 0], 0.0) - 0.5), atol=1e-6)
+
+
+def test_the_variance_of_repeated_games_is_known_from_one_evaluation():
+    """Whatever a team's chances against each opponent are, even such as no two Elos give."""
+    rng = np.random.default_rng(0)
+    anchors, repetitions = np.linspace(800, 1200, 12), 4000
+    chances = rng.dirichlet([0.3, 0.3, 0.3], size=12)
+    chances[:4] = [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 0]  # nothing is left to chance there
+    results = rng.multinomial(10, chances, size=(repetitions, 12)).transpose(2, 0, 1)
+    elos, widths = held_ratings(results[0] + 0.5 * results[1], np.full((repetitions, 12), 10), anchors)
+    nobody = Chosen(np.zeros((repetitions, 1)), np.zeros(repetitions), np.zeros(0), np.zeros(0), 1.0)
+    known = Reference(np.zeros((12, 1)), anchors, "by hand")
+    estimated = replay_variance(Truth(nobody, elos, widths, results), known)
+    assert estimated.mean() == pytest.approx(elos.var(), rel=0.08)
+    once = Truth(nobody, elos[:1], widths[:1], np.ones((3, 1, 12), dtype=int) * [[[1]], [[0]], [[0]]])
+    assert np.isnan(replay_variance(once, known)).all()
 
 
 def test_teams_stand_on_both_sides_and_in_all_orders_equally_often():
