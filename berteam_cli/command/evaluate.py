@@ -30,7 +30,6 @@ from berteam_cli.evaluation.strength import Match, Strength
 from berteam_cli.evaluation.truth import choose_teams
 from berteam_cli.folder import Manifest, logging_to
 from berteam_cli.population import names, policies
-from berteam_cli.rating.bootstrap import interval
 from berteam_cli.reading import how_far, last_state
 from berteam_cli.records import COLUMNS, EVALUATION, SHEETS, team_name, team_names, write_table
 from berteam_cli.selector.base import TeamDistribution, measured, team_count
@@ -42,6 +41,7 @@ from berteam_cli.training import Parts, Run, generator
 
 ENCOUNTERS = 40  # with each fixed team, to tell what having seen it is worth
 PLAYED, MEMBERS, REPLAYED = SHEETS
+UNSHOWN = ("games", "wins", "draws", "losses", "predicted_elo", "rank_low", "rank_high")
 
 TABLES = (
     *("elo", "members", "teams", "composition", "regression", "figures", "calibration"),
@@ -168,8 +168,13 @@ class Look:
         """Returns and shows the rows that tell how strong the teams are, and what the selector knows of it."""
         truth, exact = found.truth, learned.samples == 0
         called = names(self.parts.optimizer.islands, self.run.population)
-        tables: Tables = {"elo": list(elo_rows(truth, interval(found.samples), called, exact=exact))}
-        self.show("Strongest teams", tables, "elo", ("games", "wins", "draws", "losses", "predicted_elo"))
+        tables: Tables = {"elo": list(elo_rows(truth, called, found.samples, exact=exact))}
+        self.show(
+            "Strongest teams",
+            tables,
+            "elo",
+            ("games", "wins", "draws", "losses", "predicted_elo", "rank_low", "rank_high"),
+        )
         tables["figures"] = self.dated(figures(found, learned, fresh, rng))
         self.show("Figures", tables, "figures", whole=True)
         if exact and len(truth.elos) >= FEWEST:

@@ -18,6 +18,7 @@ from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
 from berteam_cli.folder import Manifest
 from berteam_cli.outcomes import Floats
 from berteam_cli.population import names, policies
+from berteam_cli.rating.bootstrap import interval, rank_intervals
 from berteam_cli.recording import Recorder
 from berteam_cli.records import COLUMNS, team_name, write_table
 from berteam_cli.selector.base import team_count
@@ -75,8 +76,7 @@ def conclude(
         }
     )
     called = names(parts.optimizer.islands, run.population)
-    widths = (rated.elos - rated.half_widths, rated.elos + rated.half_widths)
-    write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(rated, widths, called, exact=distribution.samples == 0))
+    write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(rated, called, exact=distribution.samples == 0))
     expected, width = rated.expected_elo()
     if math.isnan(width):
         log.info("Too few teams were rated to tell the selector's expected Elo; allow more with evaluation.games.")
@@ -104,19 +104,22 @@ def rate(
 
 
 def elo_rows(
-    rated: Truth, interval: tuple[Floats, Floats], called: list[str], *, exact: bool
+    rated: Truth, called: list[str], samples: Floats | None = None, *, exact: bool
 ) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of elo.csv, the strongest team first.
 
     Args:
         rated: the teams.
-        interval: (K,) ends of the 95 % intervals of their Elos.
         called: (N,) the members' names.
+        samples: (R, K) Elos after drawing the games anew, of which the intervals are; None: of the half widths.
         exact: whether their probabilities are; else nothing is predicted from them.
     """
     chosen = rated.chosen
     predicted, record = rated.predicted_elos(), rated.record
-    low, high = interval
+    unknown = np.full(len(rated.elos), math.nan)
+    low, high, ranks = rated.elos - rated.half_widths, rated.elos + rated.half_widths, (unknown, unknown)
+    if samples is not None:
+        (low, high), ranks = interval(samples), rank_intervals(samples)
     order = np.argsort(-rated.elos, kind="stable")
     place = np.empty(len(order), dtype=int)
     place[np.argsort(-chosen.probability, kind="stable")] = np.arange(1, len(order) + 1)
@@ -127,7 +130,7 @@ def elo_rows(
             *(results.sum(), *results),
             *(chosen.probability[k], rank),
             *((predicted[k], place[k]) if exact else (math.nan, math.nan)),
-            *(math.nan, math.nan),
+            *(ranks[0][k], ranks[1][k]),
         )
 
 

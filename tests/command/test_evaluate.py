@@ -171,6 +171,8 @@ def test_figures_are_those_of_the_tables(berteam, tmp_path):
     assert (elo.games == 6 * 10).all()
     assert (elo.games == elo.wins + elo.draws + elo.losses).all()
     assert elo.elo.between(elo.elo_low, elo.elo_high).all()
+    assert (elo.rank_low < elo.rank_high).all()
+    assert elo.rank_low.between(1, 21).all()
     assert figures.value["expected_elo"] == pytest.approx(elo.probability @ elo.elo)
     entropy = -(elo.probability * np.log(elo.probability)).sum()
     assert figures.value["effective_teams"] == pytest.approx(np.exp(entropy))
