@@ -93,6 +93,9 @@ class EvaluateConfig(OutputConfig):
     run: str = MISSING
     games_per_pair: int = number(1)
     reference_teams: int = number(2)
+    teams_at_most: int = number(2)
+    aggression_games: int = number(1)
+    replay_games: int = number(1)
     most: int = number()
     payoff_games: int = number(1)
     top: int = number(1)

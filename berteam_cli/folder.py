@@ -13,11 +13,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from berteam_cli.errors import InputError, RunError
-from berteam_cli.records import COLUMNS, EVALUATION
+from berteam_cli.records import COLUMNS, EVALUATION, SHEET_ENDINGS, SHEETS
 
 MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
 PACKAGES = ("berteam-cli", "torch", "numpy", "numba", "pandas", "stable-baselines3", "pettingzoo", "hydra-core")
@@ -47,6 +48,8 @@ def claim(folder: Path, on_exists: str) -> None:
         for name in (*(f"{table}.csv" for table in COLUMNS), MANIFEST, CONFIG, LOG, ERROR):
             for place in (folder, folder / EVALUATION):
                 (place / name).unlink(missing_ok=True)
+        for sheet, ending in product(SHEETS, SHEET_ENDINGS):
+            (folder / EVALUATION / f"{sheet}{ending}").unlink(missing_ok=True)
         for name in ("checkpoint", "tensorboard"):
             shutil.rmtree(folder / name, ignore_errors=True)
     made = missing(folder)

@@ -8,19 +8,39 @@ from berteam_cli import build, checkpoint
 from berteam_cli.config import checked
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.folder import read_manifest
-from berteam_cli.stored import stored_config
+from berteam_cli.stored import plain_config, stored_config
 from berteam_cli.training import Parts, Run
 
 
-def last_state(folder: Path) -> tuple[Parts, Run]:
+def last_state(folder: Path, workers: int | None = None) -> tuple[Parts, Run]:
     """Returns the parts of the run in ``folder`` and its newest checkpoint that is whole.
+
+    Args:
+        folder: of the run.
+        workers: threads that play; 0: as many as there are cores; None: as many as the run had.
 
     Raises:
         InputError: there is no such run, or it has no such checkpoint.
     """
     read_manifest(folder)
-    parts = build.parts_to_read(checked(stored_config(folder)))
+    config = checked(stored_config(folder))
+    if workers is not None:
+        config.workers = workers
+    parts = build.parts_to_read(config)
     try:
         return parts, checkpoint.load(folder, parts).run
     except RunError as error:
         raise InputError(str(error)) from error
+
+
+def how_far(folder: Path, epoch: int) -> str:
+    """Returns how far the run in ``folder`` had come at its checkpoint of ``epoch``, and what became of it.
+
+    Raises:
+        InputError: there is no such run.
+    """
+    status = read_manifest(folder)["status"]
+    if status == "done":
+        return f"after epoch {epoch}"
+    said = "still going or broken off" if status == "running" else status
+    return f"after epoch {epoch} of {plain_config(folder).epochs}, {said}"

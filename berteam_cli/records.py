@@ -72,6 +72,15 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     ),
     "conditioning": ("epoch", "choice", "elo", "elo_low", "elo_high"),
     "encounters": ("epoch", "opponent", "encounters", "score_before", "score_after"),
+    "members": (
+        *("epoch", "agent", "name", "island", "aggression", "aggression_low", "aggression_high"),
+        *("tags", "times_tagged", "captures", "grabs", "wall_hits", "group", "games"),
+    ),
+    "teams": ("epoch", "team", "aggression", "kind", "games"),
+    "composition": ("epoch", "kind", "teams", "probability"),
+    "regression": ("epoch", "quantity", "value", "low", "high"),
+    "figures": ("epoch", "quantity", "value", "low", "high", "team"),
+    "calibration": ("epoch", "decile", "teams", "predicted_elo", "elo", "low", "high"),
     "embeddings": ("epoch", "group", "members", "pairs", "cosine", "above_all"),
     "neighbours": ("epoch", "agent", "name", "rank", "neighbour", "neighbour_name", "cosine"),
 }
@@ -84,6 +93,9 @@ SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row i
 BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
 EVALUATION = "evaluation"
 """The folder in a run's, where `berteam evaluate` writes."""
+SHEETS = ("played", "members", "replayed")
+"""Files there, without endings, that keep games until the tables are written."""
+SHEET_ENDINGS = (".games", ".json")
 
 
 def team_name(team: Iterable[int]) -> str:

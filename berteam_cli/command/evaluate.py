@@ -1,9 +1,8 @@
-"""berteam evaluate: a run beside where choosing among its teams ends in theory, and its members beside each other."""
+"""berteam evaluate: how strong a run's teams are, what its selector knows of them, and how its members behave."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,39 +14,45 @@ from rich.console import Console
 
 from berteam_cli.command.inspect import printed
 from berteam_cli.config_commands import EvaluateConfig
-from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError
-from berteam_cli.evaluation.conditioning import Encounters, encounters
-from berteam_cli.evaluation.equilibria import (
-    Equilibrium,
-    exploitability,
-    fixed_point,
-    nash,
-    replicator,
-    total_variation,
-)
-from berteam_cli.evaluation.payoffs import Payoffs, payoffs
-from berteam_cli.evaluation.reference import reference, reference_teams
-from berteam_cli.optimizer.aggression import aggression
-from berteam_cli.outcomes import Floats
-from berteam_cli.population import island_of, names, policies
-from berteam_cli.reading import last_state
-from berteam_cli.records import COLUMNS, EVALUATION, team_name, write_table
+from berteam_cli.evaluation.calibration import deciles
+from berteam_cli.evaluation.conditioning import conditioning_rows, encounters
+from berteam_cli.evaluation.ending import elo_rows
+from berteam_cli.evaluation.equilibria import exploitability, total_variation
+from berteam_cli.evaluation.figures import Replayed, figures, replayed
+from berteam_cli.evaluation.likeness import likeness
+from berteam_cli.evaluation.manners import Manners, composition, member_rows, team_rows
+from berteam_cli.evaluation.playing import forget
+from berteam_cli.evaluation.points import Points, point_rows, reference_points, why_not
+from berteam_cli.evaluation.reference import reference
+from berteam_cli.evaluation.regression import FEWEST, regression
+from berteam_cli.evaluation.strength import Match, Strength
+from berteam_cli.evaluation.truth import choose_teams
+from berteam_cli.folder import Manifest, logging_to
+from berteam_cli.population import names, policies
+from berteam_cli.reading import how_far, last_state
+from berteam_cli.records import COLUMNS, EVALUATION, SHEETS, team_name, team_names, write_table
 from berteam_cli.selector.base import TeamDistribution, measured, team_count
-from berteam_cli.selector.embeddings import Embedding, cosines, groups, mean_cosine, nearest
-from berteam_cli.selector.independent import anybody, distribution, with_all_teams
-from berteam_cli.training import PAYOFFS, Parts, Probes, Run, generator, key
+from berteam_cli.selector.embeddings import Embedding
+from berteam_cli.selector.independent import with_all_teams
+from berteam_cli.stored import write_config
+from berteam_cli.training import EVALUATION as CHANCE
+from berteam_cli.training import Parts, Run, generator
 
-STEPS = 10_000  # of the replicator, after which it has settled
-NEIGHBOURS = 5
-OPPONENTS, ENCOUNTERS = 28, 40  # at most so many fixed teams are met, so many times each
-PROBES, PROBE_TEAMS = 2, 28  # games against each of so many teams of fixed policies, to tell aggression
+ENCOUNTERS = 40  # with each fixed team, to tell what having seen it is worth
+PLAYED, MEMBERS, REPLAYED = SHEETS
+UNSHOWN = ("games", "wins", "draws", "losses", "predicted_elo", "rank_low", "rank_high")
+
+TABLES = (
+    *("elo", "members", "teams", "composition", "regression", "figures", "calibration"),
+    *("reference_points", "embeddings", "neighbours", "conditioning", "encounters"),
+)
 
 Tables = dict[str, list[tuple[Any, ...]]]
 
 
 def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
-    """Writes and prints the reference points of a run and the likeness of its members; returns NaN.
+    """Writes and prints what a run came to, into its folder ``evaluation``; returns the selector's expected Elo.
 
     Args:
         config: checked.
@@ -56,185 +61,180 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
 
     Raises:
         InputError: there is no such run, it has no checkpoint, or its folder cannot be written.
+        RunError: it failed.
+        KeyboardInterrupt: it was interrupted; what is played is kept.
     """
     folder = Path(config.run)
-    parts, run = last_state(folder)
-    console = Console(width=None if Console().is_terminal else 120)
-    console.print(f"{folder} after epoch {run.epoch}", highlight=False)
-    playing, looking, meeting = generator(parts.seed, PAYOFFS, run.epoch).spawn(3)
-    tables: Tables = {}
-    learned = learned_mix(run, parts, config.most, playing)
-    if isinstance(learned, str):
-        console.print(f"{learned}, so there are no reference points.", highlight=False)
-    else:
-        points = reference_points(run, parts, learned, config.payoff_games, playing)
-        tables["reference_points"] = point_rows(run, parts, points)
-        show_points(console, tables["reference_points"], points, config.top)
-    if isinstance(parts.selector, Embedding):
-        tables |= likeness(run, parts, looking)
-        rows = [row[1:] for row in tables["embeddings"]]
-        title = "Cosine between members' embeddings, mean over the pairs of a group"
-        console.print(printed(title, pd.DataFrame(rows, columns=COLUMNS["embeddings"][1:])))
-    else:
-        console.print("The selector has no embeddings of members to compare.", highlight=False)
-    if parts.selector.answers and parts.selector.field.sides == 2:
-        found = encounters(run, parts, reference(parts.games, OPPONENTS), ENCOUNTERS, meeting)
-        tables |= conditioning_rows(run, found)
-        rows = [row[1:] for row in tables["conditioning"]]
-        title = f"Elo of the choice before and after a first game, {ENCOUNTERS} encounters with each fixed team"
-        console.print(printed(title, pd.DataFrame(rows, columns=COLUMNS["conditioning"][1:])))
-    for path in written(folder / EVALUATION, tables):
-        console.print(str(path), highlight=False, soft_wrap=True)
-    return math.nan
-
-
-def written(place: Path, tables: Tables) -> list[Path]:
-    """Writes ``tables`` into the folder ``place``; returns their paths.
-
-    Raises:
-        InputError: it cannot be written.
-    """
-    paths = [place / f"{name}.csv" for name in tables]
+    parts, run = last_state(folder, config.workers)
+    far = how_far(folder, run.epoch)
+    place = folder / EVALUATION
+    look = Look(config, parts, run, place, Console(width=None if Console().is_terminal else 120))
+    look.say(f"{folder} {far}")
     try:
         place.mkdir(exist_ok=True)
-        for path, (name, rows) in zip(paths, tables.items(), strict=True):
-            write_table(path, COLUMNS[name], rows)
+        write_config(place, text)
     except OSError as error:
         raise InputError(f"{place} cannot be written: {error.strerror or error}.") from error
-    return paths
+    with logging_to(place):
+        manifest = Manifest.begun(place, run=str(folder), epoch=run.epoch, evaluated=far, seed=config.seed)
+        with manifest.until_the_end(again="The same command goes on from there."):
+            tables, facts = look.all()
+            manifest.add(**facts)
+            for name in TABLES:
+                path = place / f"{name}.csv"
+                if name in tables:
+                    write_table(path, COLUMNS[name], tables[name])
+                    look.say(str(path))
+                else:  # of an evaluation that had more to say
+                    path.unlink(missing_ok=True)
+            for sheet in SHEETS:
+                forget(place / sheet)
+    return next(row[2] for row in tables["figures"] if row[1] == "expected_elo")
 
 
 @dataclass(frozen=True)
-class Points:
-    """Mixes of a run's K teams: what it learnt, and where choosing ends in theory.
+class Look:
+    """A look at a run.
 
     Attributes:
-        played: what came of their games.
-        learned: the run's distribution.
-        fixed: the fixed point of learning from weighted winners.
-        replicated: the limit of learning from winners without weights.
-        equilibrium: the Nash equilibrium of wins less losses.
+        config: of the command.
+        parts, run: what is looked at.
+        place: where the tables go.
+        console: where they are shown.
     """
 
-    played: Payoffs
-    learned: TeamDistribution
-    fixed: Floats
-    replicated: Floats
-    equilibrium: Equilibrium
+    config: EvaluateConfig
+    parts: Parts
+    run: Run
+    place: Path
+    console: Console
 
-    @property
-    def mixes(self) -> dict[str, Floats]:
-        """(K,) each, by name."""
-        named = {"learned": self.learned.probability, "fixed_point": self.fixed, "replicator": self.replicated}
-        return named | {"nash": self.equilibrium.strategy}
+    def all(self) -> tuple[Tables, dict[str, Any]]:
+        """Returns the rows of all tables, and what the manifest should say."""
+        config, parts, run = self.config, self.parts, self.run
+        # A stream for each part, so that none changes with what another draws.
+        listing, rating, behaving, again, drawing, playing, meeting = generator(config.seed, CHANCE, run.epoch).spawn(7)
+        learned = self.learned(listing)
+        known = reference(parts.games, config.reference_teams)
+        match = Match(parts.games, policies(parts.optimizer.islands, run.population, explore=False), known)
+        found, facts = self.strength(match, learned, rating)
+        fresh = replayed(match, found.truth, config.replay_games, again, self.place / REPLAYED)
+        tables = self.known_of(found, learned, fresh, drawing)
+        behaviour = np.full(run.population.size, np.nan)
+        if match.counts_events:
+            behaved = match.of_members(config.aggression_games, behaving, self.place / MEMBERS)
+            behaviour = behaved.aggression
+            tables |= self.manners(behaved, found, learned, behaving)
+        else:
+            self.say(f"Games of {parts.games.env.name} count no events, so nobody is aggressive or defensive.")
+        tables |= self.points(learned, playing)
+        if isinstance(parts.selector, Embedding):
+            tables |= likeness(run, parts, behaviour)
+            self.show("Cosine between members' embeddings, mean over the pairs of a group", tables, "embeddings")
+        else:
+            self.say("The selector has no embeddings of members to compare.")
+        if parts.selector.answers and parts.selector.field.sides == 2:
+            tables |= conditioning_rows(run.epoch, encounters(run, parts, known, ENCOUNTERS, meeting))
+            title = f"Elo of the choice before and after a first game, {ENCOUNTERS} encounters with each fixed team"
+            self.show(title, tables, "conditioning")
+        return tables, facts
 
-
-def learned_mix(run: Run, parts: Parts, most: int, rng: Generator) -> TeamDistribution | str:
-    """Returns the exact distribution over teams that ``run`` learnt, or why its teams do not play each other."""
-    field = parts.selector.field
-    teams = team_count(field.members, field.team_size)
-    if field.sides != 2:
-        return f"Games of {field.sides} sides have no payoff matrix"
-    if teams > most:
-        return f"{teams:,} possible teams are more than most={most:,}"
-    learned = measured(parts.selector, run.selection, rng)
-    if learned.samples:
-        return "The teams are too many for an exact distribution (selector.exact_limit)"
-    return with_all_teams(learned, field)
-
-
-def reference_points(run: Run, parts: Parts, learned: TeamDistribution, games_per_pair: int, rng: Generator) -> Points:
-    """Returns the reference points of all teams of ``run``, after each played each."""
-    acting = policies(parts.optimizer.islands, run.population, explore=False)
-    played = payoffs(parts.games, acting, learned.teams, games_per_pair, rng)
-    # In proportion to the orders in which the members of each team may stand.
-    orders = distribution(anybody(parts.selector.field), parts.selector.field).probability
-    limit = replicator(played.wins, orders / orders.sum(), STEPS)[-1]
-    return Points(played, learned, fixed_point(played.wins, orders), limit, nash(played.zero_sum))
-
-
-def point_rows(run: Run, parts: Parts, points: Points) -> list[tuple[Any, ...]]:
-    """Returns the rows of reference_points.csv, the most probable team first."""
-    called = names(parts.optimizer.islands, run.population)
-    surplus = points.played.zero_sum
-    against_mix = surplus @ points.learned.probability
-    rows = []
-    for k in np.argsort(-points.learned.probability, kind="stable"):
-        team = points.learned.teams[k]
-        mixes = (mix[k] for mix in points.mixes.values())
-        rows.append(
-            (
-                *(run.epoch, team_name(team), " + ".join(called[m] for m in team), *mixes),
-                *(against_mix[k], surplus[k].min(), points.played.wins[:, k].max()),
+    def learned(self, rng: Generator) -> TeamDistribution:
+        """Returns the distribution over teams; if it is exact, of all there can be, unless they are very many."""
+        field = self.parts.selector.field
+        found = measured(self.parts.selector, self.run.selection, rng)
+        if found.samples:
+            self.say(
+                f"The chances of teams are estimated from {found.samples:,} drawn ones (selector.exact_limit), "
+                f"so there is no regression and no calibration."
             )
+            return found
+        few = team_count(field.members, field.team_size) <= self.config.teams_at_most
+        return with_all_teams(found, field) if few else found
+
+    def strength(self, match: Match, learned: TeamDistribution, rng: Generator) -> tuple[Strength, dict[str, Any]]:
+        """Returns how strong the teams are, and what the manifest should say of how that was measured."""
+        selector, most = self.parts.selector, self.config.teams_at_most
+        choosing, playing = rng.spawn(2)
+        chosen = choose_teams(learned, lambda count: selector.sample(self.run.selection, count, choosing), 1, most)
+        teams = team_count(selector.field.members, selector.field.team_size)
+        if len(chosen) < teams:
+            self.say(f"{len(chosen):,} of {teams:,} possible teams are rated (teams_at_most={most:,}).")
+        title = f"Rating {len(chosen):,} teams"
+        found = match.strength(chosen, self.config.games_per_pair, playing, title, self.place / PLAYED)
+        return found, {"teams": teams, "rated": len(chosen), "reference": match.reference.source}
+
+    def known_of(self, found: Strength, learned: TeamDistribution, fresh: Replayed, rng: Generator) -> Tables:
+        """Returns and shows the rows that tell how strong the teams are, and what the selector knows of it."""
+        truth, exact = found.truth, learned.samples == 0
+        called = names(self.parts.optimizer.islands, self.run.population)
+        tables: Tables = {"elo": list(elo_rows(truth, called, found.samples, exact=exact))}
+        self.show(
+            "Strongest teams",
+            tables,
+            "elo",
+            ("games", "wins", "draws", "losses", "predicted_elo", "rank_low", "rank_high"),
         )
-    return rows
+        tables["figures"] = self.dated(figures(found, learned, fresh, rng))
+        self.show("Figures", tables, "figures", whole=True)
+        if exact and len(truth.elos) >= FEWEST:
+            fitted = regression(truth.elos, truth.chosen.probability, found.noise, rng)
+            tables["regression"] = self.dated((name, *value) for name, value in fitted.items())
+            self.show("Probability of a team on its Elo", tables, "regression", whole=True)
+        if exact:
+            tables["calibration"] = self.dated(deciles(found))
+            self.show("Tenths of the teams, the most probable first", tables, "calibration", whole=True)
+        return tables
+
+    def manners(self, behaved: Manners, found: Strength, learned: TeamDistribution, rng: Generator) -> Tables:
+        """Returns and shows the rows that tell how members and teams behave; the game counts events."""
+        members = member_rows(self.run, self.parts, behaved, rng)
+        tables: Tables = {"members": members, "composition": self.dated(composition(learned, behaved.aggression))}
+        if found.manners is not None:
+            tables["teams"] = self.dated(team_rows(found.truth.chosen.teams, found.manners, behaved.aggression))
+        self.show("Members", tables, "members", ("island", "wall_hits", "games"))
+        self.show("Teams that are chosen", tables, "composition", whole=True)
+        return tables
+
+    def points(self, learned: TeamDistribution, rng: Generator) -> Tables:
+        """Returns and shows the rows of reference_points.csv, or says why there are none."""
+        reason = why_not(self.parts, learned, self.config.most)
+        if reason:
+            self.say(f"{reason}, so there are no reference points.")
+            return {}
+        points = reference_points(self.run, self.parts, learned, self.config.payoff_games, rng)
+        tables: Tables = {"reference_points": point_rows(self.run, self.parts, points)}
+        self.show("Teams, the most probable first", tables, "reference_points")
+        self.console.print(printed("Mixes: exploitability, total variation from what was learnt", mixes(points)))
+        self.say(f"Of all Nash equilibria of wins less losses this is {points.equilibrium.which}.")
+        unbeaten = team_names(points.learned.teams[~points.played.wins.any(axis=0)])
+        top = self.config.top
+        listed = ", ".join(unbeaten[:top]) + (f" and {len(unbeaten) - top} more" if len(unbeaten) > top else "")
+        self.say(f"Teams that never lost: {listed or 'none'}.")
+        return tables
+
+    def dated(self, rows: Iterable[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+        """Returns ``rows`` with the epoch in front."""
+        return [(self.run.epoch, *row) for row in rows]
+
+    def say(self, sentence: str) -> None:
+        """Prints a sentence."""
+        self.console.print(sentence, highlight=False, soft_wrap=True)
+
+    def show(self, title: str, tables: Tables, name: str, leave: Sequence[str] = (), *, whole: bool = False) -> None:
+        """Prints the first rows of a table, as many as the config says, or the ``whole`` of it."""
+        table = pd.DataFrame(tables[name], columns=COLUMNS[name]).drop(columns=[*leave, "epoch"], errors="ignore")
+        self.console.print(printed(title, table if whole else table.head(self.config.top)))
 
 
-def show_points(console: Console, rows: list[tuple[Any, ...]], points: Points, top: int) -> None:
-    """Prints the reference points: team by team, then each mix as a whole."""
-    teams = pd.DataFrame(rows, columns=COLUMNS["reference_points"]).drop(columns="epoch")
-    console.print(printed("Teams, the most probable first", teams.head(top)))
+def mixes(points: Points) -> pd.DataFrame:
+    """Returns each mix as a whole."""
     learned, surplus = points.learned.probability, points.played.zero_sum
-    mixes = pd.DataFrame(
-        [
-            (
-                *(name, exploitability(mix, surplus), total_variation(mix, learned)),
-                *(team_name(points.learned.teams[mix.argmax()]), mix.max()),
-            )
-            for name, mix in points.mixes.items()
-        ],
-        columns=["mix", "exploitability", "from learned", "first team", "its share"],
-    )
-    console.print(printed("Mixes: exploitability, total variation from what was learnt", mixes))
-    console.print(f"Of all Nash equilibria of wins less losses this is {points.equilibrium.which}.", highlight=False)
-    unbeaten = [team_name(points.learned.teams[k]) for k in np.flatnonzero(~points.played.wins.any(axis=0))]
-    listed = ", ".join(unbeaten[:top]) + (f" and {len(unbeaten) - top} more" if len(unbeaten) > top else "")
-    console.print(f"Teams that never lost: {listed or 'none'}.", highlight=False)
-
-
-def conditioning_rows(run: Run, found: Encounters) -> Tables:
-    """Returns the rows of conditioning.csv and encounters.csv."""
-    opponents = [team_name(team) for team in found.reference.teams]
-    means = zip(opponents, found.before.mean(axis=1), found.after.mean(axis=1), strict=True)
-    each = found.before.shape[1]
-    return {
-        "conditioning": [(run.epoch, choice, *elo) for choice, elo in found.elos().items()],
-        "encounters": [(run.epoch, opponent, each, before, after) for opponent, before, after in means],
-    }
-
-
-def likeness(run: Run, parts: Parts, rng: Generator) -> Tables:
-    """Returns the rows of embeddings.csv and neighbours.csv."""
-    islands = parts.optimizer.islands
-    similarity = cosines(parts.selector.embeddings(run.selection))
-    home = [islands[i] for i in island_of(islands)]
-    labels = [x.name for x in home], [x.learner.algorithm for x in home]
-    found = groups(*labels, run.population.fitness, behaviour(run, parts, rng))
-    mean = mean_cosine(similarity, found["all"])
-    rows = []
-    for name, chosen in found.items():
-        size, cosine = int(chosen.sum()), mean_cosine(similarity, chosen)
-        rows.append((run.epoch, name, size, size * (size - 1) // 2, cosine, cosine - mean))
-    return {"embeddings": rows, "neighbours": list(neighbour_rows(run, parts, similarity))}
-
-
-def neighbour_rows(run: Run, parts: Parts, similarity: Floats) -> Iterator[tuple[Any, ...]]:
-    """Returns the rows of neighbours.csv."""
-    called = names(parts.optimizer.islands, run.population)
-    for n, others in enumerate(nearest(similarity, NEIGHBOURS)):
-        for rank, other in enumerate(others, start=1):
-            yield run.epoch, n, called[n], rank, other, called[other], similarity[n, other]
-
-
-def behaviour(run: Run, parts: Parts, rng: Generator) -> Floats:
-    """Returns (N,) the aggression of each member, as a team made only of it; NaN in games that count no events."""
-    env, people = parts.games.env, run.population
-    if not isinstance(env, Mctf):
-        return np.full(people.size, np.nan)
-    opponents = reference_teams(env.standard_policies, env.team_size, PROBE_TEAMS)
-    each = len(opponents) * PROBES
-    teams = np.arange(people.size).repeat(each)[:, np.newaxis].repeat(env.team_size, axis=1)
-    others = np.tile(np.repeat(opponents, PROBES, axis=0), (people.size, 1))
-    outcomes = Probes(parts, key(rng)).play(people, teams, others, each)
-    return aggression(outcomes).reshape(people.size, each).mean(axis=1)
+    rows = [
+        (
+            *(name, exploitability(mix, surplus), total_variation(mix, learned)),
+            *(team_name(points.learned.teams[mix.argmax()]), mix.max()),
+        )
+        for name, mix in points.mixes.items()
+    ]
+    return pd.DataFrame(rows, columns=["mix", "exploitability", "from learned", "first team", "its share"])

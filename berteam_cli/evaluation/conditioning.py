@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -13,6 +14,7 @@ from berteam_cli.games import as_side_0, both_sides, in_turn
 from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.population import policies
 from berteam_cli.rating.bradley_terry import held_ratings
+from berteam_cli.records import team_name
 from berteam_cli.selector.observations import seen_in
 from berteam_cli.training import Parts, Run, key
 
@@ -100,3 +102,14 @@ def met(run: Run, parts: Parts, acting: Policies, theirs: Ints, rng: Generator) 
     ours = selector.sample(run.selection, count, rng, seen=seen)
     second, _ = games.play(acting, both_sides(ours, theirs, count), key(rng))
     return np.array([as_side_0(x, count).scores[:, 0] for x in (first, second)])
+
+
+def conditioning_rows(epoch: int, found: Encounters) -> dict[str, list[tuple[Any, ...]]]:
+    """Returns the rows of conditioning.csv and encounters.csv after ``epoch`` epochs."""
+    opponents = [team_name(team) for team in found.reference.teams]
+    means = zip(opponents, found.before.mean(axis=1), found.after.mean(axis=1), strict=True)
+    each = found.before.shape[1]
+    return {
+        "conditioning": [(epoch, choice, *elo) for choice, elo in found.elos().items()],
+        "encounters": [(epoch, opponent, each, before, after) for opponent, before, after in means],
+    }

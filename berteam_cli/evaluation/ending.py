@@ -16,7 +16,9 @@ from berteam_cli.config_groups import EvaluationConfig
 from berteam_cli.evaluation.reference import Reference, reference, reference_teams
 from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
 from berteam_cli.folder import Manifest
+from berteam_cli.outcomes import Floats
 from berteam_cli.population import names, policies
+from berteam_cli.rating.bootstrap import interval, rank_intervals
 from berteam_cli.recording import Recorder
 from berteam_cli.records import COLUMNS, team_name, write_table
 from berteam_cli.selector.base import team_count
@@ -94,34 +96,41 @@ def rate(
     """Returns the Elos of the ``chosen`` teams, and where those of their opponents come from."""
     parts = recorder.parts
     if len(chosen) == 0:
-        none = np.zeros(0, dtype=np.int64)
-        return Truth(chosen, np.zeros(0), np.zeros(0), none, none, none), "none: no team was rated"
+        nobody = Truth(chosen, np.zeros(0), np.zeros(0), np.zeros((3, 0, 0), dtype=np.int64))
+        return nobody, "none: no team was rated"
     known: Reference = reference(parts.games, settings.reference_teams)
     members = policies(parts.optimizer.islands, run.population, explore=False)
     return truth(parts.games, members, chosen, known, settings.games_per_pair, rng), known.source
 
 
-def elo_rows(rated: Truth, called: list[str], *, exact: bool) -> Iterator[tuple[Any, ...]]:
+def elo_rows(
+    rated: Truth, called: list[str], samples: Floats | None = None, *, exact: bool
+) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of elo.csv, the strongest team first.
 
     Args:
         rated: the teams.
         called: (N,) the members' names.
+        samples: (R, K) Elos after drawing the games anew, of which the intervals are; None: of the half widths.
         exact: whether their probabilities are; else nothing is predicted from them.
     """
     chosen = rated.chosen
-    predicted = rated.predicted_elos()
+    predicted, record = rated.predicted_elos(), rated.record
+    unknown = np.full(len(rated.elos), math.nan)
+    low, high, ranks = rated.elos - rated.half_widths, rated.elos + rated.half_widths, (unknown, unknown)
+    if samples is not None:
+        (low, high), ranks = interval(samples), rank_intervals(samples)
     order = np.argsort(-rated.elos, kind="stable")
     place = np.empty(len(order), dtype=int)
     place[np.argsort(-chosen.probability, kind="stable")] = np.arange(1, len(order) + 1)
     for rank, k in enumerate(order, start=1):
-        elo, width, team = rated.elos[k], rated.half_widths[k], chosen.teams[k]
+        team, results = chosen.teams[k], record[:, k]
         yield (
-            *(team_name(team), " + ".join(called[m] for m in team), elo, elo - width, elo + width),
-            *(rated.wins[k] + rated.draws[k] + rated.losses[k], rated.wins[k], rated.draws[k], rated.losses[k]),
+            *(team_name(team), " + ".join(called[m] for m in team), rated.elos[k], low[k], high[k]),
+            *(results.sum(), *results),
             *(chosen.probability[k], rank),
             *((predicted[k], place[k]) if exact else (math.nan, math.nan)),
-            *(math.nan, math.nan),
+            *(ranks[0][k], ranks[1][k]),
         )
 
 

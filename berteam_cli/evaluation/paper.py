@@ -49,7 +49,7 @@ def rows(experiment: str, found: Reproduced) -> list[tuple[Any, ...]]:
 
 
 def over_seeds(runs: list[Path], value: Callable[[Path], Interval]) -> Interval:
-    """Returns the mean of a figure of several ``runs`` and its 95 % interval by Student's t; of one run, what it has."""
+    """Returns the mean of a figure of ``runs`` and its 95 % interval by Student's t; of a single one, what it has."""
     each = [value(run) for run in runs]
     if len(each) == 1:
         return each[0]
@@ -64,7 +64,7 @@ def fixed(quantity: str, found: Reproduced) -> Interval:
     runs = next(iter(found.runs.values()))
     elos = table(found.tournament, "elo").set_index("team")
     if kind == "Elo":
-        return tuple(float(x) for x in elos.loc[name, ["elo", "elo_low", "elo_high"]])  # type: ignore[return-value]
+        return interval_of(elos.loc[name], ("elo", "elo_low", "elo_high"))
     teams = list(elos.index[:7]) if name == "the seven best teams" else [name]
     return over_seeds(runs, lambda run: (float(chances(run).reindex(teams).sum()), math.nan, math.nan))
 
@@ -105,8 +105,14 @@ def compared(quantity: str, found: Reproduced) -> Interval:
     of = table(found.comparison, "runs").set_index("run").algorithm
     row = ours.loc[of[str(found.runs[optimizer, selector][0])]]
     if kind == "Elo":
-        return tuple(float(x) for x in row[["mixed_elo", "mixed_elo_low", "mixed_elo_high"]])  # type: ignore[return-value]
+        return interval_of(row, ("mixed_elo", "mixed_elo_low", "mixed_elo_high"))
     return exact(row.epoch_s if kind == "seconds an epoch" else row.update_s)
+
+
+def interval_of(row: pd.Series, columns: tuple[str, str, str]) -> Interval:
+    """Returns three columns of a table's row."""
+    value, low, high = (float(row[column]) for column in columns)
+    return value, low, high
 
 
 def exact(value: float) -> Interval:

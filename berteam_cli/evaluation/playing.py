@@ -14,6 +14,7 @@ from berteam_cli.acting import Policies
 from berteam_cli.games import Games
 from berteam_cli.outcomes import EVENTS, Lineups, Outcomes
 from berteam_cli.progress import progress
+from berteam_cli.records import SHEET_ENDINGS
 from berteam_cli.training import key
 
 log = logging.getLogger("berteam")
@@ -66,7 +67,7 @@ def play_all(
 
 def forget(sheet: Path) -> None:
     """Removes what ``play_all`` kept: its tables are written."""
-    for ending in (".games", ".json"):
+    for ending in SHEET_ENDINGS:
         sheet.with_suffix(ending).unlink(missing_ok=True)
 
 

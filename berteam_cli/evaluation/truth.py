@@ -12,12 +12,16 @@ from numpy.random import Generator
 from scipy.special import stdtrit
 
 from berteam_cli.acting import Policies, fixed_policies, joined
+from berteam_cli.evaluation.playing import play_all
 from berteam_cli.evaluation.reference import Reference
+from berteam_cli.evaluation.tournament import schedule
 from berteam_cli.games import Games, arrangements, placed
-from berteam_cli.outcomes import Bools, Floats, Ints
-from berteam_cli.rating.bradley_terry import Z_95, held_ratings
-from berteam_cli.rating.elo import points
+from berteam_cli.outcomes import Bools, Floats, Ints, Lineups, Outcomes
+from berteam_cli.rating.bootstrap import RESAMPLES, held_samples
+from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, Z_95, expected, held_ratings
+from berteam_cli.rating.elo import POINTS_PER_NAT, nats, points
 from berteam_cli.selector.base import TeamDistribution
+from berteam_cli.training import key
 
 NEGLIGIBLE = 1e-9  # probability that rounding leaves
 
@@ -52,15 +56,18 @@ class Truth:
         chosen: the teams.
         elos: (K,).
         half_widths: (K,) of their 95 % intervals.
-        wins, draws, losses: (K,) games.
+        results: (3, K, J) games won, drawn and lost against each of J teams of fixed policies.
     """
 
     chosen: Chosen
     elos: Floats
     half_widths: Floats
-    wins: Ints
-    draws: Ints
-    losses: Ints
+    results: Ints
+
+    @property
+    def record(self) -> Ints:
+        """(3, K) games won, drawn and lost."""
+        return self.results.sum(axis=2)
 
     def expected_elo(self) -> tuple[float, float]:
         """Returns the Elo of a team that the selector chooses, and its 95 % half width.
@@ -162,6 +169,70 @@ def rest_of(top: Ints, drawn_by: Callable[[int], Ints], count: int) -> Ints:
     return np.array(found[:count], dtype=np.int64).reshape(-1, top.shape[1])
 
 
+@dataclass(frozen=True)
+class Fixture:
+    """The games of K teams against J teams of fixed policies, G against each.
+
+    Attributes:
+        acting: how members and fixed policies act.
+        lineups: K J G games, those of a team in a row.
+        held: (K J G, S) the sides where our team stands.
+        shape: (K, J, G).
+    """
+
+    acting: Policies
+    lineups: Lineups
+    held: Bools
+    shape: tuple[int, int, int]
+
+
+def fixture(
+    games: Games, members: Policies, teams: Ints, reference: Reference, games_per_pair: int, rng: Generator
+) -> Fixture:
+    """Returns the games of all ``teams`` against all of ``reference``.
+
+    In turn as ``games.arrangements`` says: of two sides from either, of more alone or with the other team alone. The
+    members of both stand in every order in turn, or in random ones where there are more orders than games.
+
+    Args:
+        games: the game and its threads.
+        members: how the members act in evaluation.
+        teams: (K, T).
+        reference: the opponents.
+        games_per_pair: G.
+        rng: orders the members.
+    """
+    ours, anchors = len(teams), len(reference.teams)
+    everyone = np.concatenate([teams, reference.teams + len(members.kind)])
+    first, second = np.divmod(np.arange(ours * anchors), anchors)
+    ways = arrangements(games.env.sides)
+    played = schedule(everyone, first, second + ours, games_per_pair, len(ways), rng)
+    held = ways[np.arange(ours * anchors * games_per_pair) % (anchors * games_per_pair) % len(ways)]
+    acting = joined([members, fixed_policies(range(games.env.standard_policies))])
+    return Fixture(acting, placed(*played, held), held, (ours, anchors, games_per_pair))
+
+
+def rated(chosen: Chosen, reference: Reference, fixture: Fixture, outcomes: Outcomes) -> Truth:
+    """Returns the Elos of the ``chosen`` teams, from the ``outcomes`` of their ``fixture`` with ``reference``."""
+    held, anchors, sides = fixture.held, len(reference.teams), outcomes.scores.shape[1]
+    made = np.where(held, outcomes.scores, 0.0).sum(axis=1).reshape(fixture.shape)
+    left = np.where(held, 0.0, outcomes.scores).sum(axis=1).reshape(fixture.shape)
+    stood = held.sum(axis=1).reshape(fixture.shape)  # on so many sides
+    points, played, handicaps = [], [], []
+    for k in np.unique(stood):
+        points.append(np.where(stood == k, made, 0.0).sum(axis=2))
+        played.append((stood == k).sum(axis=2))
+        handicaps.append(np.full(anchors, math.log((sides - k) / k)))
+    elos, half_widths = held_ratings(
+        np.concatenate(points, axis=1),
+        np.concatenate(played, axis=1),
+        np.tile(reference.elos, len(handicaps)),
+        np.concatenate(handicaps),
+    )
+    won, lost = (left == 0.0).sum(axis=2), (made == 0.0).sum(axis=2)
+    return Truth(chosen, elos, half_widths, np.stack([won, fixture.shape[2] - won - lost, lost]))
+
+
 def truth(
     games: Games,
     members: Policies,
@@ -170,43 +241,39 @@ def truth(
     games_per_pair: int,
     rng: Generator,
 ) -> Truth:
-    """Returns the Elos of the ``chosen`` teams.
+    """Returns the Elos of the ``chosen`` teams; see ``fixture``, whose games ``rng`` seeds too."""
+    matches = fixture(games, members, chosen.teams, reference, games_per_pair, rng)
+    title = f"Rating {len(chosen):,} teams"
+    return rated(chosen, reference, matches, play_all(games, matches.acting, matches.lineups, key(rng), title))
 
-    Every team plays every team of ``reference``, in turn as ``games.arrangements`` says: of two sides from either, of
-    more alone or with the other team alone. The members of both stand in random order.
+
+def elo_samples(found: Truth, reference: Reference, sides: int, rng: Generator) -> Floats:
+    """Returns (R, K) Elos as other games of the same teams might have given them.
+
+    By drawing the games anew; among more than two ``sides``, where a game has several kinds of draws, from the normal
+    distribution of the Fisher information.
+    """
+    if sides == 2:
+        return held_samples(*found.results, reference.elos, rng)
+    return found.elos + found.half_widths / Z_95 * rng.standard_normal((RESAMPLES, len(found.elos)))
+
+
+def replay_variance(found: Truth, reference: Reference) -> Floats:
+    """Returns (K,) the variance of each Elo over repetitions of the same games, NaN where a pair met only once.
+
+    From how the scores against one opponent scatter around their own mean. Games drawn anew (``elo_samples``) scatter
+    more: they also differ in who was met how often, and where a team fares better against some opponents and worse
+    against others than two Elos can say, that counts as noise.
 
     Args:
-        games: the game and its threads.
-        members: how the members act in evaluation.
-        chosen: as of ``choose_teams``.
-        reference: the opponents and their Elos.
-        games_per_pair: games against each of them.
-        rng: orders the members and seeds the games.
+        found: Elos from games of two sides.
+        reference: whom they met.
     """
-    teams = chosen.teams
-    acting = joined([members, fixed_policies(range(games.env.standard_policies))])
-    anchors = len(reference.teams)
-    ours = np.repeat(teams, anchors * games_per_pair, axis=0)
-    theirs = np.tile(np.repeat(reference.teams + len(members.kind), games_per_pair, axis=0), (len(teams), 1))
-    each = anchors * games_per_pair
-    ways = arrangements(games.env.sides)
-    held = ways[np.arange(len(ours)) % each % len(ways)]
-    lineups = placed(rng.permuted(ours, axis=1), rng.permuted(theirs, axis=1), held)
-    outcomes, _ = games.play(acting, lineups, int(rng.integers(2**63)))
-    shape = (len(teams), anchors, games_per_pair)
-    made = np.where(held, outcomes.scores, 0.0).sum(axis=1).reshape(shape)
-    left = np.where(held, 0.0, outcomes.scores).sum(axis=1).reshape(shape)
-    stood = held.sum(axis=1).reshape(shape)  # on so many sides
-    points, played, handicaps = [], [], []
-    for k in np.unique(stood):
-        points.append(np.where(stood == k, made, 0.0).sum(axis=2))
-        played.append((stood == k).sum(axis=2))
-        handicaps.append(np.full(anchors, math.log((games.env.sides - k) / k)))
-    elos, half_widths = held_ratings(
-        np.concatenate(points, axis=1),
-        np.concatenate(played, axis=1),
-        np.tile(reference.elos, len(handicaps)),
-        np.concatenate(handicaps),
-    )
-    won, lost = (left == 0.0).sum(axis=(1, 2)), (made == 0.0).sum(axis=(1, 2))
-    return Truth(chosen, elos, half_widths, won, each - won - lost, lost)
+    won, drawn, _ = found.results
+    games = found.results.sum(axis=0).astype(float)
+    made = won + 0.5 * drawn
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scatter = (won + 0.25 * drawn - made**2 / games) * games / (games - 1)
+    chances = expected(nats(found.elos)[:, np.newaxis], nats(reference.elos))
+    information = (games * chances * (1 - chances)).sum(axis=1) + PRIOR_DRAWS / 4
+    return (POINTS_PER_NAT / information) ** 2 * scatter.sum(axis=1)

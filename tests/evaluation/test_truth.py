@@ -4,8 +4,10 @@ import pytest
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
 from berteam_cli.evaluation.reference import Reference, reference
-from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, truth
+from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, fixture, replay_variance, truth
 from berteam_cli.games import Games
+from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, expected, held_ratings
+from berteam_cli.rating.elo import nats
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
 from berteam_cli.workers import Workers
 from tests.makers import mctf
@@ -26,7 +28,7 @@ def rated(probability, elos, listed=True, draws=0, width=10.0):
     probability, listed = np.asarray(probability, dtype=float), np.broadcast_to(listed, count)
     draws = np.broadcast_to(draws, count)
     chosen = Chosen(zeros[:, np.newaxis], probability, listed, draws, float(probability[listed].sum()))
-    return Truth(chosen, np.asarray(elos, dtype=float), np.full(count, width), zeros, zeros, zeros)
+    return Truth(chosen, np.asarray(elos, dtype=float), np.full(count, width), np.zeros((3, count, 1), dtype=int))
 
 
 def test_all_teams_are_rated_if_there_are_games_for_them():
@@ -97,9 +99,8 @@ def test_the_interval_of_the_expected_elo_covers_it():
     covered = 0
     for seed in range(300):
         chosen = choose_teams(found, drawn_by(found, seed), 1, 16)
-        zeros = np.zeros(len(chosen), dtype=int)
         known = np.array([by_team[tuple(t)] for t in chosen.teams])
-        mean, width = Truth(chosen, known, np.zeros(len(chosen)), zeros, zeros, zeros).expected_elo()
+        mean, width = Truth(chosen, known, np.zeros(len(chosen)), np.zeros((3, len(chosen), 1))).expected_elo()
         covered += abs(mean - found.probability @ elos) <= width
     assert 0.90 <= covered / 300 <= 1
 
@@ -119,8 +120,44 @@ def test_the_fixed_teams_get_their_own_elos_back():
     chosen = Chosen(known.teams, np.full(28, 1 / 28), np.ones(28, dtype=bool), np.zeros(28, dtype=int), 1.0)
     found = truth(games, fixed_policies(range(7)), chosen, known, 2, np.random.default_rng(0))
     assert (np.abs(found.elos - known.elos) < found.half_widths).all()
-    assert (found.wins + found.draws + found.losses == 56).all()
+    assert (found.results.sum(axis=0) == 2).all()
     assert np.corrcoef(found.elos, known.elos)[0, 1] > 0.98
+    # Of held anchors, each team makes the points that are expected of it, but for the prior's.
+    strengths, held = nats(found.elos)[:, np.newaxis], nats(known.elos)
+    made = (found.results[0] + 0.5 * found.results[1]).sum(axis=1)
+    missing = made - (2 * expected(strengths, held)).sum(axis=1)
+    np.testing.assert_allclose(missing, PRIOR_DRAWS * (expected(strengths[:, 0], 0.0) - 0.5), atol=1e-6)
+
+
+def test_the_variance_of_repeated_games_is_known_from_one_evaluation():
+    """Whatever a team's chances against each opponent are, even such as no two Elos give."""
+    rng = np.random.default_rng(0)
+    anchors, repetitions = np.linspace(800, 1200, 12), 4000
+    chances = rng.dirichlet([0.3, 0.3, 0.3], size=12)
+    chances[:4] = [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 0]  # nothing is left to chance there
+    results = rng.multinomial(10, chances, size=(repetitions, 12)).transpose(2, 0, 1)
+    elos, widths = held_ratings(results[0] + 0.5 * results[1], np.full((repetitions, 12), 10), anchors)
+    nobody = Chosen(np.zeros((repetitions, 1)), np.zeros(repetitions), np.zeros(0), np.zeros(0), 1.0)
+    known = Reference(np.zeros((12, 1)), anchors, "by hand")
+    estimated = replay_variance(Truth(nobody, elos, widths, results), known)
+    assert estimated.mean() == pytest.approx(elos.var(), rel=0.08)
+    once = Truth(nobody, elos[:1], widths[:1], np.ones((3, 1, 12), dtype=int) * [[[1]], [[0]], [[0]]])
+    assert np.isnan(replay_variance(once, known)).all()
+
+
+def test_teams_stand_on_both_sides_and_in_all_orders_equally_often():
+    games = mctf(2)
+    known = reference(games, 28)
+    teams = unordered_teams(7, 2)[[1, 8]]
+    found = fixture(games, fixed_policies(range(7)), teams, known, 8, np.random.default_rng(0))
+    assert found.shape == (2, 28, 8)
+    side = found.held.argmax(axis=1)
+    ours = found.lineups.teams[np.arange(len(side)), side].reshape(2, 28, 8, 2)
+    theirs = found.lineups.teams[np.arange(len(side)), 1 - side].reshape(2, 28, 8, 2) - 7
+    np.testing.assert_array_equal(np.sort(ours, axis=3), np.broadcast_to(teams[:, None, None], ours.shape))
+    np.testing.assert_array_equal(np.sort(theirs, axis=3), np.broadcast_to(known.teams[None, :, None], theirs.shape))
+    ways = {(*a, *b, s) for a, b, s in zip(ours[0, 1], theirs[0, 1], side.reshape(2, 28, 8)[0, 1], strict=True)}
+    assert len(ways) == 8  # 0-1 against 0-1: two orders of each, from both sides
 
 
 def test_other_rules_have_another_yardstick():
@@ -139,8 +176,8 @@ def test_the_fixed_teams_get_their_own_elos_back_among_more_sides(sides):
     found = truth(games, fixed_policies(range(3)), chosen, known, 2 * sides, np.random.default_rng(0))
     assert np.ptp(known.elos) > 80
     np.testing.assert_allclose(found.elos, known.elos, atol=3)  # but for the prior's pull to the mean
-    np.testing.assert_array_equal(found.wins + found.draws + found.losses, 12 * sides)
-    np.testing.assert_array_equal(found.draws > found.losses, found.elos > 1000)  # against itself a team draws
+    np.testing.assert_array_equal(found.record.sum(axis=0), 12 * sides)
+    np.testing.assert_array_equal(found.record[1] > found.record[2], found.elos > 1000)  # against itself a team draws
 
 
 @pytest.mark.parametrize("sides", [3, 5])
@@ -151,4 +188,4 @@ def test_alone_a_share_of_the_points_is_what_an_equal_scores(sides):
     rocks = Reference(np.zeros((1, 1), dtype=int), np.full(1, 1000.0), "by hand")
     found = truth(games, fixed_policies(range(3)), one, rocks, 1, np.random.default_rng(0))
     assert found.elos[0] == pytest.approx(1000, abs=1e-6)
-    assert (found.wins[0], found.draws[0], found.losses[0]) == (0, 1, 0)
+    assert found.record[:, 0].tolist() == [0, 1, 0]
