@@ -86,9 +86,14 @@ def config_of(command: str, words: list[str]) -> tuple[Any, str]:
     Raises:
         InputError: a choice, a key or a value is wrong.
     """
-    with initialize_config_module(CONF, version_base="1.3", job_name=command):
-        config = composed(command, [], parsed(words))
-        return checked(config), OmegaConf.to_yaml(config, resolve=True)
+    outer = GlobalHydra.instance().hydra  # of the command that asks for another
+    GlobalHydra.instance().clear()
+    try:
+        with initialize_config_module(CONF, version_base="1.3", job_name=command):
+            config = composed(command, [], parsed(words))
+            return checked(config), OmegaConf.to_yaml(config, resolve=True)
+    finally:
+        GlobalHydra.instance().hydra = outer
 
 
 def check_sweep_folder(overrides: list[Override]) -> None:

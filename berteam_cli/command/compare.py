@@ -165,15 +165,15 @@ def narrow(table: pd.DataFrame) -> pd.DataFrame:
     """Returns ``table`` with each figure and its interval in one column."""
     for name in [x.removesuffix("_low") for x in table.columns if x.endswith("_low")]:
         columns = [name, f"{name}_low", f"{name}_high"]
-        digits = 0 if table[name].abs().max() >= 10 else 3
-        table[name] = [spoken(*row, digits) for row in table[columns].itertuples(index=False)]
+        table[name] = [spoken(*row) for row in table[columns].itertuples(index=False)]
         table = table.drop(columns=columns[1:])
     return table
 
 
-def spoken(value: float, low: float, high: float, digits: int) -> str:
+def spoken(value: float, low: float, high: float) -> str:
     """Returns a figure with its interval, as far as they are known."""
     if math.isnan(value):
         return ""
+    digits = 0 if abs(value) >= 100 else 3
     known = "" if math.isnan(low) else f" [{low:.{digits}f}, {high:.{digits}f}]"
     return f"{value:.{digits}f}{known}"
