@@ -13,6 +13,7 @@ import numpy as np
 
 from berteam_cli.outcomes import Floats
 from berteam_cli.rating.elo import POINTS_PER_NAT, nats, points
+from berteam_cli.rating.groups import warn_of_groups
 
 # Draws against an average player that everyone is given, so that a perfect record stays finite. A quarter of one game
 # moves a team with 47 points of 54 by 3 Elo.
@@ -49,6 +50,7 @@ def ratings(scores: Floats, games: Floats, handicap: float = 0.0) -> tuple[Float
         handicap: in nats, of the player that stands alone: ln(S - 1) against the copies on S - 1 sides, 0 for S = 2.
     """
     games = np.where(np.eye(len(games), dtype=bool), 0.0, games)
+    warn_of_groups(games)
     scores = np.where(games > 0, scores, 0.0)
     # What row made together with its copies, in the games where column stood alone.
     crowds = games.T if handicap > 0 else np.zeros_like(games)
