@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from omegaconf import MISSING
@@ -50,6 +50,17 @@ class TrainConfig(CommandConfig):
 
 
 @dataclass
+class SprtConfig:
+    """Settings of evaluation/sequential.py."""
+
+    rounds: int = number(1)
+    elo0: float = number(-2000, 2000)
+    elo1: float = number(-2000, 2000)
+    alpha: float = number(0, 0.5, open_low=True)
+    beta: float = number(0, 0.5, open_low=True)
+
+
+@dataclass
 class TournamentConfig(CommandConfig):
     """Settings of ``berteam tournament``."""
 
@@ -61,6 +72,8 @@ class TournamentConfig(CommandConfig):
     games_per_pair: int = number(1)
     random_starts: bool = MISSING
     action_noise: float = number(0, 1)
+    rating: str = choice("ml", "davidson", "paper")
+    sprt: SprtConfig = field(default_factory=SprtConfig)
 
 
 @dataclass

@@ -47,7 +47,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("expected_elo", "expected_elo_low", "expected_elo_high", "best_team", "best_elo"),
         *("games", "env_steps", "wall_s", "peak_rss_mib"),
     ),
-    "pairs": ("team", "opponent", "games", "wins", "draws", "losses", "side", "superiority"),
+    "pairs": (
+        *("team", "opponent", "games", "wins", "draws", "losses", "side", "superiority"),
+        *("log_ratio", "decision"),
+    ),
+    "online_elo": ("team", "elo"),
     "crosstable": ("team",),  # and a column for each team
     "cycles": ("cycle", "weakest_score", "weakest_low"),
     "strategies": (

@@ -68,11 +68,27 @@ def players(config: TournamentConfig, overridden: Collection[str] = ()) -> Entry
         entry = replace(entry, teams=listed(config.teams, entry))
     said = f"teams={config.teams}" if config.teams else f"top={config.top}" if runs else size_said(config)
     check_size(len(entry.teams), said, config)
+    check_rating(config, entry.games.env.sides)
     if config.action_noise > 0:
         if entry.games.env.name == "pettingzoo":
             raise InputError("action_noise is for env=mctf and env=rps, but the game is env=pettingzoo's.")
         entry = replace(entry, policies=noisy(entry.policies, config.action_noise))
     return entry
+
+
+def check_rating(config: TournamentConfig, sides: int) -> None:
+    """Checks that games of so many sides can be rated and tested as configured.
+
+    Raises:
+        InputError: they cannot.
+    """
+    test = config.sprt
+    if test.rounds > 1 and not test.elo0 < test.elo1:
+        raise InputError(f"sprt.elo0 must be below sprt.elo1, but they are {test.elo0:g} and {test.elo1:g}.")
+    if sides > 2 and config.rating != "ml":
+        raise InputError(f"rating={config.rating} is for games of two sides, but these have {sides}; use rating=ml.")
+    if sides > 2 and test.rounds > 1:
+        raise InputError(f"sprt.rounds={test.rounds} is for games of two sides, but these have {sides}; use 1.")
 
 
 def runs_of(config: TournamentConfig) -> list[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterator
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +15,32 @@ from berteam_cli.command.entrants import players, runs_of, with_game_of
 from berteam_cli.command.inspect import show
 from berteam_cli.config_commands import TournamentConfig
 from berteam_cli.errors import InputError
-from berteam_cli.evaluation.certainty import Cells, cells, cycles, elo_samples, scores_of, strategies
-from berteam_cli.evaluation.playing import forget, play_all
-from berteam_cli.evaluation.tournament import Standings, counted, planned, plays_every_order
+from berteam_cli.evaluation.certainty import (
+    Cells,
+    cells,
+    cycles,
+    davidson_samples,
+    elo_samples,
+    results_of,
+    scores_of,
+    strategies,
+)
+from berteam_cli.evaluation.rounds import forget_rounds, play_rounds
+from berteam_cli.evaluation.sequential import Sprt
+from berteam_cli.evaluation.tournament import Standings, counted, plays_every_order
 from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
 from berteam_cli.outcomes import SIDES, Floats
 from berteam_cli.rating.bootstrap import interval, rank_intervals, superiority
 from berteam_cli.rating.copies import chancy_teams, clusters
+from berteam_cli.rating.davidson import davidson
+from berteam_cli.rating.paper import in_order, online_elos, squared_error_elos
 from berteam_cli.recording import game_rows, side_rows
 from berteam_cli.records import COLUMNS, SIDES_TABLE, team_name, team_names, write_table
 from berteam_cli.stored import check_same, write_config
-from berteam_cli.training import key
 
 log = logging.getLogger("berteam")
+
+VERDICTS = {1: "stronger", -1: "weaker", 0: "open"}
 
 __all__ = ["players", "tournament"]
 
@@ -54,20 +68,20 @@ def tournament(config: TournamentConfig, text: str, folder: Path | None = None) 
         log.info("%d teams, %d pairs, %d games each.", facts["teams"], facts["pairs"], config.games_per_pair)
         with manifest.until_the_end(again=f"Go on with the same command and out={folder} on_exists=resume."):
             rng = np.random.default_rng(config.seed)
-            sides, pairs = entry.games.env.sides, np.triu_indices(len(entry.teams), 1)
-            plan = planned(sides, entry.teams, pairs, config.games_per_pair, rng)
-            sheet = folder / "checkpoint" / "played"
-            outcomes = play_all(entry.games, entry.policies, plan.lineups, key(rng), "Tournament", sheet)
+            sides, test, sheets = entry.games.env.sides, Sprt(**asdict(config.sprt)), folder / "checkpoint"
+            plan, outcomes = play_rounds(
+                entry.games, entry.policies, entry.teams, config.games_per_pair, test, rng, sheets
+            )
             standings = counted(entry.teams, plan, outcomes)
             alike = clusters(entry.games.env, entry.policies, plan.lineups.teams)
             copied = int((alike != np.arange(len(alike))).sum())
             if copied:
                 log.info("%d of %d games are copies of others, and make no Elo surer.", copied, len(alike))
-            manifest.add(copies=copied)
+            manifest.add(copies=copied, games=len(alike))
             chance = chancy_teams(entry.games.env, entry.policies, entry.teams)
             known = cells(standings, alike, chance, plays_every_order(sides, entry.teams, config.games_per_pair))
-            write(folder, standings, known, entry.names, np.random.default_rng([config.seed, 1]))
-            forget(sheet)
+            write(folder, standings, known, entry.names, config.rating, test, np.random.default_rng([config.seed, 1]))
+            forget_rounds(sheets)
     show(folder, 10)
     return math.nan
 
@@ -88,11 +102,24 @@ def begun(folder: Path, config: TournamentConfig, text: str, facts: dict[str, An
     return Manifest.begun(folder, **facts)
 
 
-def write(folder: Path, standings: Standings, games: Cells, called: list[str], rng: np.random.Generator) -> None:
+def write(
+    folder: Path,
+    standings: Standings,
+    games: Cells,
+    called: list[str],
+    rating: str,
+    test: Sprt,
+    rng: np.random.Generator,
+) -> None:
     """Writes all tables of a tournament between players who are ``called`` so."""
-    drawn = elo_samples(standings, games, rng)
+    standings, drawn = rated(standings, games, rating, rng)
     write_table(folder / "elo.csv", COLUMNS["elo"], elo_rows(standings, drawn, called))
-    write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings, superiority(drawn)))
+    write_table(folder / "pairs.csv", COLUMNS["pairs"], pair_rows(standings, drawn, test))
+    if rating == "paper":
+        elos = online_elos(len(standings.teams), in_order(standings.pairs, first_scores(standings)))
+        order = np.argsort(-elos, kind="stable")
+        rows = zip(team_names(standings.teams[order]), elos[order], strict=True)
+        write_table(folder / "online_elo.csv", COLUMNS["online_elo"], rows)
     names = team_names(standings.teams)
     scores = scores_of(games, len(names), games.counts.astype(float))
     order = np.argsort(-standings.elos, kind="stable")
@@ -123,11 +150,32 @@ def strategy_rows(
         yield team_name(team), members, *found.alpha_rank[:, k], *found.nash[:, k]
 
 
-def elo_rows(standings: Standings, drawn: Floats, called: list[str]) -> Iterator[tuple[Any, ...]]:
+def rated(standings: Standings, games: Cells, rating: str, rng: np.random.Generator) -> tuple[Standings, Floats | None]:
+    """Returns the standings with Elos as ``rating`` tells, and (R, K) of them as other games might have given them.
+
+    The paper's ways have no such samples.
+    """
+    players = len(standings.teams)
+    if rating == "ml":
+        return standings, elo_samples(standings, games, rng)
+    if rating == "davidson":
+        found = davidson(*results_of(games, players, games.counts.astype(float)))
+        log.info("Two equal teams draw with chance %.2f (Davidson's model).", found.nu / (2 + found.nu))
+        return replace(standings, elos=found.elos), davidson_samples(games, players, rng)
+    elos = squared_error_elos(standings.points, standings.games.astype(float))
+    return replace(standings, elos=elos), None
+
+
+def first_scores(standings: Standings) -> Floats:
+    """Returns (B,) what the first team of each game made, between two sides."""
+    return np.where(standings.first_held, standings.outcomes.scores, 0.0).sum(axis=1)
+
+
+def elo_rows(standings: Standings, drawn: Floats | None, called: list[str]) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of elo.csv, the strongest team first; nobody predicted anything here."""
     won, drew, lost = standings.record.sum(axis=2)
-    low, high = interval(drawn)
-    best, worst = rank_intervals(drawn)
+    unknown = np.full(len(standings.elos), math.nan)
+    low, high, best, worst = (unknown,) * 4 if drawn is None else (*interval(drawn), *rank_intervals(drawn))
     for rank, k in enumerate(np.argsort(-standings.elos, kind="stable"), start=1):
         team = standings.teams[k]
         yield (
@@ -137,12 +185,19 @@ def elo_rows(standings: Standings, drawn: Floats, called: list[str]) -> Iterator
         )
 
 
-def pair_rows(standings: Standings, stronger: Floats) -> Iterator[tuple[Any, ...]]:
+def pair_rows(standings: Standings, drawn: Floats | None, test: Sprt) -> Iterator[tuple[Any, ...]]:
     """Returns the rows of pairs.csv: each team against each other, apart for the side it played alone."""
-    names = team_names(standings.teams)
-    for k, team in enumerate(names):
-        for j, opponent in enumerate(names):
-            for color, results in zip(SIDES, standings.results, strict=False):
-                counts = results[:, k, j]
-                if counts.sum():
-                    yield team, opponent, counts.sum(), *counts, color, stronger[k, j]
+    names, players = team_names(standings.teams), len(standings.teams)
+    stronger = np.full((players, players), math.nan) if drawn is None else superiority(drawn)
+    # As it was asked of the team of the smaller index; of the other it is the opposite.
+    ratio = np.triu(test.log_ratio(*standings.record), 1)
+    ratio = ratio - ratio.T
+    for k, j in np.ndindex(players, players):
+        verdict: tuple[float, str] = (math.nan, "")
+        if test.rounds > 1:
+            decided = int(test.decided(ratio[k, j] if k < j else -ratio[k, j]))
+            verdict = float(ratio[k, j]), VERDICTS[decided if k < j else -decided]
+        for color, results in zip(SIDES, standings.results, strict=False):
+            counts = results[:, k, j]
+            if counts.sum():
+                yield names[k], names[j], counts.sum(), *counts, color, stronger[k, j], *verdict

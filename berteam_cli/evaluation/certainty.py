@@ -14,6 +14,8 @@ from berteam_cli.evaluation.equilibria import nash
 from berteam_cli.evaluation.tournament import Standings
 from berteam_cli.outcomes import Bools, Floats, Ints
 from berteam_cli.rating.bootstrap import CONFIDENCE, RESAMPLES, cell_samples, interval
+from berteam_cli.rating.bradley_terry import PRIOR_DRAWS
+from berteam_cli.rating.davidson import davidson
 
 STRATEGY_RESAMPLES = 200  # each needs a linear programme of K teams
 MOST_TEAMS = 300  # that are fitted 1,000 times in half a minute
@@ -82,6 +84,29 @@ def elo_samples(standings: Standings, games: Cells, rng: Generator) -> Floats:
         start=standings.elos,
         copies=games.copies,
     )
+
+
+DAVIDSON_RESAMPLES = 200  # each is fitted on its own
+
+
+def davidson_samples(games: Cells, players: int, rng: Generator) -> Floats:
+    """Returns (R, K) Elos by Davidson's model of the tournament's games, between two sides, drawn anew."""
+
+    def drawn() -> Floats:
+        wins, draws = results_of(games, players, rng.poisson(games.counts).astype(float))
+        return davidson(wins, draws, rng.exponential(PRIOR_DRAWS, players)).elos
+
+    return np.array([drawn() for _ in range(DAVIDSON_RESAMPLES)])
+
+
+def results_of(games: Cells, players: int, counts: Floats) -> tuple[Floats, Floats]:
+    """Returns (K, K) games that row won against column, and drawn ones, of two sides, from ``counts`` (C,) of games."""
+    wins, draws = np.zeros((2, players, players))
+    weight = counts * games.copies
+    for (row, column), won in (((games.alone, games.others), 1.0), ((games.others, games.alone), 0.0)):
+        np.add.at(wins, (row, column), weight * (games.scored == won))
+        np.add.at(draws, (row, column), weight * (games.scored == 0.5))
+    return wins, draws
 
 
 def scores_of(games: Cells, players: int, counts: Floats) -> Floats:

@@ -6,7 +6,9 @@ import numpy as np
 
 from berteam_cli.acting import FIXED, SAMPLED, Policies
 from berteam_cli.env.base import Env
+from berteam_cli.env.mctf import Mctf
 from berteam_cli.outcomes import Bools, Ints
+from mctf.rules import STARTS_RANDOM
 
 RANDOM = ("random", "combined")  # how the names of fixed policies begin that draw their actions
 
@@ -22,7 +24,7 @@ def draws_actions(env: Env, policies: Policies) -> Bools:
 
 def game_draws(env: Env) -> bool:
     """Returns whether the game itself knows chance: mctf where players start anywhere, and any game of PettingZoo."""
-    return env.name == "pettingzoo" or env.fingerprint().get("starts") == "random"
+    return env.name == "pettingzoo" or (isinstance(env, Mctf) and env.rules.starts == STARTS_RANDOM)
 
 
 def chancy_teams(env: Env, policies: Policies, teams: Ints) -> Bools:

@@ -7,6 +7,15 @@ import pytest
 SB3 = ("train", "population=ppo6", "learner=sb3")
 
 CASES = {
+    ("tournament", "rating=glicko"): "rating must be one of davidson, ml, paper, but is 'glicko'",
+    ("tournament", "sprt.rounds=9", "sprt.elo0=5", "sprt.elo1=5"): "sprt.elo0 must be below sprt.elo1",
+    ("tournament", "env=rps", "env.sides=3", "rating=davidson"): "rating=davidson is for games of two sides",
+    ("tournament", "env=rps", "env.sides=3", "sprt.rounds=2"): "sprt.rounds=2 is for games of two sides",
+    ("reproduce", "paper_fxed"): "what must be one of .*Did you mean paper_fixed",
+    ("reproduce", "paper_fixed", "scale=0"): "scale must be > 0 and <= 1",
+    ("reproduce",): "what must be given first",
+    ("compare", "nowhere", "nobody"): "nowhere is no folder of a run",
+    ("compare", "nowhere", "-m"): "compare does one thing at a time",
     ("trian",): "'trian' is no command.*Did you mean train",
     ("train", "selector=mcca"): "selector must be one of .*, mcaa, .*, but is 'mcca'.*Did you mean mcaa",
     ("train", "population=ppo5"): "population must be one of .*Did you mean ppo50",

@@ -3,6 +3,8 @@ import json
 import numpy as np
 import pandas as pd
 
+from berteam_cli.evaluation import playing
+from berteam_cli.games import Games
 from tests.command.conftest import SMALL_BERTEAM, TINY
 
 
@@ -127,18 +129,86 @@ def test_teams_of_two_runs_and_fixed_ones(berteam, tmp_path):
     assert len(elo) > 4
 
 
-def test_a_cut_tournament_goes_on(berteam, tmp_path):
-    """Cut off after the first batch, it ends with the same bytes; another config is refused."""
-    words = (*HANDS, "games_per_pair=1000", "action_noise=0.2")
+def test_a_cut_tournament_goes_on(berteam, tmp_path, monkeypatch):
+    """Interrupted after the first batch, it goes on with the second, to the same bytes; another config is refused."""
+    words = (*HANDS, "games_per_pair=100", "action_noise=0.2")
+    monkeypatch.setattr(playing, "BATCH", 80)
     berteam(*words, "out=whole")
-    whole = tmp_path / "whole"
-    cut = tmp_path / "cut"
-    berteam(*words, "out=cut")
-    manifest = json.loads((cut / "manifest.json").read_text())
-    (cut / "manifest.json").write_text(json.dumps(manifest | {"status": "interrupted"}))
-    for name in ("elo", "games", "pairs"):
-        (cut / f"{name}.csv").unlink()
+    play, calls = Games.play, []
+
+    def interrupted(self, policies, lineups, *rest, **named):
+        calls.append(len(lineups))
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return play(self, policies, lineups, *rest, **named)
+
+    monkeypatch.setattr(Games, "play", interrupted)
+    said = berteam(*words, "out=cut", code=130).stdout
+    assert "on_exists=resume" in said
+    assert not (tmp_path / "cut" / "elo.csv").exists()
     assert "begun with" in berteam(*words, "seed=5", "out=cut", "on_exists=resume", code=2).stderr
-    berteam(*words, "out=cut", "on_exists=resume")
+    berteam(*words, "workers=1", "out=cut", "on_exists=resume")
+    assert calls == [80, 80, 80, 80, 60]
     for name in ("elo", "games", "pairs", "strategies", "cycles"):
-        assert (cut / f"{name}.csv").read_bytes() == (whole / f"{name}.csv").read_bytes()
+        assert (tmp_path / "cut" / f"{name}.csv").read_bytes() == (tmp_path / "whole" / f"{name}.csv").read_bytes()
+    assert not (tmp_path / "cut" / "checkpoint").exists()
+    assert "it is done" in berteam(*words, "workers=1", "out=cut", "on_exists=resume", code=2).stderr
+
+
+def test_pairs_play_until_it_is_clear_who_is_stronger(berteam, tmp_path):
+    noisy = (*HANDS, "games_per_pair=10", "action_noise=0.3", "sprt.rounds=60")
+    for workers in (1, 2):
+        berteam(*noisy, f"workers={workers}", f"out=t{workers}")
+    pairs = read(tmp_path / "t1", "pairs")
+    assert pairs.equals(read(tmp_path / "t2", "pairs"))
+    verdict = pairs.drop_duplicates(["team", "opponent"]).set_index(["team", "opponent"])
+    for winner, loser in (("1", "0"), ("2", "1"), ("0", "2")):  # paper wraps rock, and so on
+        assert verdict.decision[winner, loser] == "stronger"
+        assert verdict.decision[loser, winner] == "weaker"
+        assert abs(verdict.log_ratio[winner, loser]) > np.log(19)
+    games = pairs.groupby(["team", "opponent"]).games.sum()
+    assert (games < 600).all()
+    assert (games % 10 == 0).all()
+    berteam(*HANDS, "games_per_pair=2", "sprt.rounds=60", "out=sure")
+    assert (read(tmp_path / "sure", "pairs").groupby(["team", "opponent"]).games.sum() == 2).all()  # more are copies
+    berteam(*HANDS, "games_per_pair=10", "out=once")
+    assert read(tmp_path / "once", "pairs")[["log_ratio", "decision"]].isna().all(axis=None)
+
+
+def test_other_ratings(berteam, tmp_path):
+    words = ("tournament", "env=rps", "games_per_pair=4", "action_noise=0.4")
+    for rating in ("ml", "davidson", "paper"):
+        berteam(*words, f"rating={rating}", f"out={rating}")
+    ml, davidson, paper = (read(tmp_path / x, "elo").set_index("team") for x in ("ml", "davidson", "paper"))
+    assert np.isclose(davidson.elo.mean(), 1000)
+    assert np.corrcoef(ml.elo, davidson.elo[ml.index])[0, 1] > 0.9
+    assert ((davidson.elo_low < davidson.elo) & (davidson.elo < davidson.elo_high)).all()
+    assert paper[["elo_low", "elo_high", "rank_low", "rank_high"]].isna().all(axis=None)
+    online = read(tmp_path / "paper", "online_elo")
+    assert np.isclose(online.elo.mean(), 1000)
+    assert set(online.team) == set(ml.index)
+    assert not (tmp_path / "ml" / "online_elo.csv").exists()
+
+
+def test_naming_policies_in_another_order_renames_teams_only(berteam, tmp_path):
+    berteam(*HANDS, "policies=[rock,paper,scissors]", "games_per_pair=2", "out=a")
+    berteam(*HANDS, "policies=[scissors,rock,paper]", "games_per_pair=2", "out=b")
+    one, two = (read(tmp_path / x, "elo").set_index("members") for x in "ab")
+    assert np.allclose(one.elo, two.elo[one.index])
+    assert (tmp_path / "b" / "cycles.csv").read_text().count(" > ") == 2
+
+
+def test_random_starts_make_games_differ(berteam, tmp_path):
+    words = ("tournament", "teams=[2-2,0-0]", "games_per_pair=16", "env.max_time_s=60")
+    berteam(*words, "out=fixed")
+    berteam(*words, "random_starts=true", "out=anywhere")
+    manifests = [json.loads((tmp_path / x / "manifest.json").read_text()) for x in ("fixed", "anywhere")]
+    assert [x["copies"] for x in manifests] == [14, 0]
+
+
+def test_runs_of_different_games_do_not_meet(berteam):
+    berteam("train", "population=hands", "env=rps", "epochs=1", "out=two")
+    berteam("train", "population=hands", "env=rps", "epochs=1", "team_size=1", "out=one")
+    said = berteam("tournament", "run=[two,one]", "out=t", code=2).stderr
+    assert said.count("\n") == 1
+    assert "two" in said and "one" in said
