@@ -80,4 +80,4 @@ def place(sources: list[Source]) -> Path:
 def section(key: str, source: Source, seed: int) -> Section:
     """Returns what the page says of a run."""
     plots: list[Plot] = [made for plot in PLOTS if (made := plot(source)) is not None]
-    return Section(key, source, overview.headline(source), plots, best_game(source, seed))
+    return Section(key, source, overview.headline(source), plots, best_game(source, seed), overview.evaluated(source))

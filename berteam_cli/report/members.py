@@ -91,11 +91,16 @@ def embeddings(source: Source) -> Plot:
     flat, shares = plane(found)
     last = None if source.agents is None else source.agents[source.agents.epoch == source.agents.epoch.max()]
     island = ["members"] * len(flat) if last is None or len(last) != len(flat) else list(last.island.astype(str))
+    manner = manners(source, len(flat))
+    both = [f"{home}, {way}" if way else home for home, way in zip(island, manner, strict=True)]
+    homes, ways = list(dict.fromkeys(island)), list(dict.fromkeys(manner))
     figure, (plot,) = panels(height_in=4.2)
-    for k, group in enumerate(dict.fromkeys(island)):
-        x, y = flat[[name == group for name in island]].T
-        color, marker = SERIES[k % len(SERIES)], MARKERS[k % len(MARKERS)]
-        plot.plot(x, y, marker, color=color, markersize=6, label=short(group), markeredgecolor=LIGHT["card"])
+    for group in dict.fromkeys(both):
+        x, y = flat[[name == group for name in both]].T
+        first = both.index(group)
+        color = SERIES[homes.index(island[first]) % len(SERIES)]
+        marker = MARKERS[ways.index(manner[first]) if len(ways) > 1 else homes.index(island[first]) % len(MARKERS)]
+        plot.plot(x, y, marker, color=color, markersize=6, label=short(group, 34), markeredgecolor=LIGHT["card"])
     for agent in range(len(flat)) if len(flat) <= LINES else ():
         at = (flat[agent, 0], flat[agent, 1])
         plot.annotate(str(agent), at, (4, 3), textcoords="offset points", fontsize=7, color=LIGHT["pale"])
@@ -107,6 +112,14 @@ def embeddings(source: Source) -> Plot:
         "not shown; evaluation/embeddings.csv has the cosines in all of them."
     )
     return drawn(figure, name, title, says, f"Map of {len(flat)} members by island.")
+
+
+def manners(source: Source, members: int) -> list[str]:
+    """Returns whether each of so many members is aggressive or defensive, nothing where that was not measured."""
+    table = source.evaluated("members")
+    if table is None or len(table) != members:
+        return [""] * members
+    return list(table.sort_values("agent").group.fillna("").astype(str))
 
 
 def vectors(source: Source) -> Floats | str:

@@ -13,8 +13,15 @@ from berteam_cli.command.inspect import read_table
 from berteam_cli.report.source import Source
 
 COMPARISON = "comparison"
-COMPARED = {COMPARISON: "Algorithms compared", "pairs": "Games between the runs", "runs": "The runs compared"}
+COMPARED = {COMPARISON: "Algorithms compared", "versus": "Algorithm against algorithm", "runs": "The runs compared"}
 """Tables of `berteam compare`, and what stands above them."""
+EVALUATED = {
+    "regression": "Probability on Elo, over all rated teams",
+    "composition": "Which kind of team is chosen",
+    "calibration": "Tenths of the teams, the most probable first",
+    "embeddings": "Cosine between members' embeddings, by group",
+}
+"""Tables of `berteam evaluate` that are shown as they are, and what stands above them."""
 MOST_ROWS = 60
 
 
@@ -22,14 +29,14 @@ def headline(source: Source) -> dict[str, str]:
     """Returns the figures that sum up a run, by name."""
     facts: dict[str, str] = {"Status": str(source.manifest["status"])}
     summary, timing = source.table("summary"), source.table("timing")
-    if summary is not None:
+    if summary is not None and not math.isnan(summary.expected_elo[0]):
         row = summary.iloc[0]
         facts["Expected Elo"] = spread(row.expected_elo, row.expected_elo_low, row.expected_elo_high)
     figures = source.evaluated("figures")
     if figures is not None:
         for row in figures.itertuples():
             low, high = getattr(row, "low", math.nan), getattr(row, "high", math.nan)
-            facts[str(row.quantity).replace("_", " ")] = spread(row.value, low, high)
+            facts[str(row.quantity).replace("_", " ").capitalize().replace("elo", "Elo")] = spread(row.value, low, high)
     if source.elo is not None:
         best = source.elo.iloc[0]
         facts["Best team"] = f"{best.team} ({best.members})"
@@ -72,17 +79,34 @@ def compared(folder: Path) -> dict[str, pd.DataFrame]:
         InputError: one cannot be read.
     """
     tables = {said: read_table(folder, name, columns=()) for name, said in COMPARED.items()}
-    return {said: table.head(MOST_ROWS) for said, table in tables.items() if table is not None}
+    return {said: narrow(table.head(MOST_ROWS)) for said, table in tables.items() if table is not None}
+
+
+def evaluated(source: Source) -> dict[str, pd.DataFrame]:
+    """Returns the tables of a run's evaluation by what stands above them."""
+    tables = {said: source.evaluated(name) for name, said in EVALUATED.items()}
+    return {said: narrow(x.drop(columns="epoch")) for said, x in tables.items() if x is not None and len(x)}
+
+
+def narrow(table: pd.DataFrame) -> pd.DataFrame:
+    """Returns ``table`` with each figure and its interval in one column; an interval without a name is of ``value``."""
+    told = table.copy()
+    for low in [x for x in table.columns if x == "low" or x.endswith("_low")]:
+        name = low.removesuffix("_low") if low != "low" else "value" if "value" in table.columns else "elo"
+        ends = [name, low, low.removesuffix("low") + "high"]
+        told[name] = [spread(*row) for row in table[ends].astype(float).itertuples(index=False)]
+        told = told.drop(columns=ends[1:])
+    return told
 
 
 def spread(value: float, low: float, high: float) -> str:
     """Returns a figure and its interval as they are read."""
     if not isinstance(value, int | float) or math.isnan(value):
         return "unknown" if not isinstance(value, str) else value
-    digits = 0 if abs(value) >= 100 else 3
+    form = ",.0f" if abs(value) >= 100 else ",.3f" if abs(value) >= 0.01 or value == 0 else ".2g"
     if math.isnan(low) or math.isnan(high):
-        return f"{value:,.{digits}f}"
-    return f"{value:,.{digits}f} ({low:,.{digits}f} to {high:,.{digits}f})"
+        return f"{value:{form}}"
+    return f"{value:{form}} ({low:{form}} to {high:{form}})"
 
 
 def duration(seconds: float) -> str:

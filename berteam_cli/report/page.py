@@ -25,6 +25,7 @@ class Section:
         figures: that sum it up, by name.
         plots: in the order of the page.
         replay: a game.
+        tables: of its evaluation, by what stands above them.
     """
 
     key: str
@@ -32,6 +33,7 @@ class Section:
     figures: dict[str, str]
     plots: list[Plot]
     replay: Replay
+    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ def navigation(report: Report) -> str:
             links.append((section.key, section.source.folder.name))
             continue
         links += [(f"{section.key}-{plot.name}", plot.title) for plot in section.plots]
+        links += [(f"{section.key}-tables", "Tables of the evaluation")] if section.tables else []
         links += [(f"{section.key}-replay", section.replay.title), (f"{section.key}-config", "Config and manifest")]
     return "".join(f'<li><a href="#{escape(key)}">{escape(said)}</a></li>' for key, said in links)
 
@@ -101,9 +104,13 @@ def overview(rows: list[dict[str, str]]) -> str:
 
 def compared(k: int, said: str, frame: pd.DataFrame) -> str:
     """Returns a table of a comparison."""
+    return f'<section id="compared-{k}"><h2>{escape(said)}</h2>{framed(frame)}</section>'
+
+
+def framed(frame: pd.DataFrame) -> str:
+    """Returns a table of a run or of a comparison."""
     rows = [[written(value) for value in row] for row in frame.itertuples(index=False)]
-    shown = table([str(column).replace("_", " ") for column in frame.columns], rows)
-    return f'<section id="compared-{k}"><h2>{escape(said)}</h2>{shown}</section>'
+    return table([str(column).replace("_", " ") for column in frame.columns], rows)
 
 
 def table(columns: list[str], rows: list[list[str]]) -> str:
@@ -125,11 +132,12 @@ def of_run(section: Section, *, several: bool) -> str:
     command = " ".join(map(str, source.manifest["command"]))
     made = f"<p>Made by <code>{escape(command)}</code>, started {escape(str(source.manifest['started']))}.</p>"
     plots = "".join(plotted(section.key, plot) for plot in section.plots if plot.svg)
+    tables = "".join(f"<h3>{escape(said)}</h3>{framed(frame)}" for said, frame in section.tables.items())
     facts = escape(json.dumps(source.manifest, indent=1, ensure_ascii=False))
     config = escape(source.config or "There is no config.yaml in the folder.")
     return (
         f'<section id="{key}">{heading}{remark}<dl class="figures">{figures}</dl>{made}'
-        f'<div class="plots">{plots}</div>{watched(section)}{absent(section)}'
+        f'<div class="plots">{plots}</div><div id="{key}-tables">{tables}</div>{watched(section)}{absent(section)}'
         f'<div id="{key}-config"><h3>Config and manifest</h3>'
         f"<details><summary>config.yaml: every value of the run</summary><pre>{config}</pre></details>"
         f"<details><summary>manifest.json: versions, seed, times</summary><pre>{facts}</pre></details></div></section>"

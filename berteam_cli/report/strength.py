@@ -63,6 +63,15 @@ def against_probability(source: Source) -> Plot:
         "would rise by 1 in 400 Elo. The noise of the Elos flattens the line and lowers R²; teams rated because they "
         "are probable are no random sample."
     )
+    regression = source.evaluated("regression")
+    if regression is not None:
+        of = regression.set_index("quantity")
+        slope, explains = (of.loc[x, ["value", "low", "high"]].astype(float) for x in ("slope", "r_squared"))
+        says += (
+            f" Of the probability itself, over all rated teams: {100 * slope.value:.2g} in 100 Elo "
+            f"({100 * slope.low:.2g} to {100 * slope.high:.2g}), R² {explains.value:.2f} "
+            f"({explains.low:.2f} to {explains.high:.2f})."
+        )
     return drawn(figure, name, title, says, f"Scatter of {len(table)} teams: {fit}.")
 
 
