@@ -1,0 +1,85 @@
+"""Games between runs, counted and rated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from berteam_cli.acting import fixed_policies
+from berteam_cli.evaluation.comparison import Plan, Played, compared, counted, even_share
+from berteam_cli.evaluation.reference import Reference
+from berteam_cli.games import placed
+from berteam_cli.outcomes import Outcomes
+from berteam_cli.rating.bradley_terry import held_ratings
+
+ANCHORS = Reference(np.array([[0], [1]]), np.array([900.0, 1100.0]), "by hand")
+
+
+def games():
+    """Two runs: each samples two teams for two fixed ones, on both sides; then five games between them."""
+    rng = np.random.default_rng(0)
+    first = np.concatenate([np.tile([True, False], 8), [True, True, False, False, True]])
+    lineups = placed(np.zeros((21, 1), int), np.ones((21, 1), int), np.stack([first, ~first], axis=1))
+    plan = Plan(fixed_policies([0, 1]), lineups, first, [2, 2], np.zeros(5, int), np.ones(5, int))
+    ours = rng.choice([0.0, 0.5, 1.0], 21)
+    scores = np.where(first[:, None], np.stack([ours, 1 - ours], axis=1), np.stack([1 - ours, ours], axis=1))
+    return plan, Outcomes(lineups, scores, np.ones(21, int), np.zeros((21, 2, 4), int), np.zeros(21, np.uint64)), ours
+
+
+def test_games_are_counted_for_whom_they_are():
+    plan, outcomes, ours = games()
+    found = counted(plan, outcomes, 2)
+    for r, run in enumerate(ours[:16].reshape(2, 2, 2, 2)):
+        for column, score in enumerate((1.0, 0.5, 0.0)):
+            np.testing.assert_array_equal(found.fixed[r][:, :, column], (run == score).sum(axis=2))
+    between = [(ours[16:] == score).sum() for score in (1.0, 0.5, 0.0)]
+    np.testing.assert_array_equal(found.versus[0, 1], between)
+    np.testing.assert_array_equal(found.versus[1, 0], between[::-1])
+    assert not found.versus[[0, 1], [0, 1]].any()
+
+
+def test_swapping_the_colours_of_all_games_changes_nothing():
+    plan, outcomes, _ = games()
+    swapped = counted(replace(plan, first=~plan.first), replace(outcomes, scores=outcomes.scores[:, ::-1]), 2)
+    found = counted(plan, outcomes, 2)
+    np.testing.assert_array_equal(swapped.versus, found.versus)
+    np.testing.assert_array_equal(swapped.fixed, found.fixed)
+
+
+def test_both_sides_get_the_same_number_of_games_and_nobody_too_few():
+    assert [even_share(games, parts) for games, parts in ((10, 1), (10, 3), (1, 4), (7, 2))] == [10, 4, 2, 4]
+
+
+def played(strong, weak, teams=40):
+    """One algorithm of two strong runs, one of a weak run: games won, drawn and lost against each anchor, and between."""
+    fixed = [np.tile(x, (teams, 2, 1)) for x in (strong, strong, weak)]
+    versus = np.zeros((3, 3, 3), int)
+    versus[0, 2], versus[1, 2] = (150, 20, 30), (150, 20, 30)
+    versus[2, 0] = versus[2, 1] = (30, 20, 150)
+    return Played(versus, fixed)
+
+
+def test_a_stronger_algorithm_is_said_to_be_stronger():
+    of = np.array([0, 0, 1])
+    found = compared(played((3, 0, 1), (1, 1, 2)), of, ANCHORS, np.random.default_rng(1))
+    assert found.algorithms.mixed[0] > found.algorithms.mixed[1] + 100
+    assert found.algorithms.scores[0, 1] == pytest.approx(320 / 400)
+    assert found.algorithms.scores[0, 1] + found.algorithms.scores[1, 0] == pytest.approx(1)
+    assert np.isnan(found.algorithms.scores[0, 0])
+    assert found.improvement[0, 1] == 1
+    assert np.isnan(found.iqm[1])
+    assert found.iqm[0] == pytest.approx(found.runs.mixed[:2].mean())
+    assert np.isnan(found.iqm_samples[:, 1]).all()
+    low, high = np.quantile(found.algorithms.mixed_samples, [0.025, 0.975], axis=0)
+    assert (low < found.algorithms.mixed).all()
+    assert (found.algorithms.mixed < high).all()
+
+
+def test_the_expected_elo_is_the_mean_of_the_sampled_teams():
+    strong, weak = np.array([[3, 0, 1]] * 2), np.array([[0, 2, 2]] * 2)
+    mixed = Played(np.zeros((2, 2, 3), int), [np.stack([strong] * 3 + [weak]), np.stack([weak] * 4)])
+    found = compared(mixed, np.array([0, 1]), ANCHORS, np.random.default_rng(2))
+    elos = held_ratings(np.array([[3.0, 3.0], [1.0, 1.0]]), np.full((2, 2), 4.0), ANCHORS.elos)[0]
+    assert found.runs.expected == pytest.approx([(3 * elos[0] + elos[1]) / 4, elos[1]])
+    assert found.runs.expected_samples[:, 1] == pytest.approx(np.full(1000, elos[1]))  # all its teams are alike
+    assert found.runs.expected_samples[:, 0].std() > 10
