@@ -51,7 +51,7 @@ def test_both_sides_get_the_same_number_of_games_and_nobody_too_few():
 
 
 def played(strong, weak, teams=40):
-    """One algorithm of two strong runs, one of a weak run: games won, drawn and lost against each anchor, and between."""
+    """An algorithm of two strong runs and one of a weak run: games won, drawn and lost against each anchor."""
     fixed = [np.tile(x, (teams, 2, 1)) for x in (strong, strong, weak)]
     versus = np.zeros((3, 3, 3), int)
     versus[0, 2], versus[1, 2] = (150, 20, 30), (150, 20, 30)
