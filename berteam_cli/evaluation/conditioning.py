@@ -13,6 +13,7 @@ from berteam_cli.evaluation.reference import Reference
 from berteam_cli.games import as_side_0, both_sides, in_turn
 from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.population import policies
+from berteam_cli.progress import progress
 from berteam_cli.rating.bradley_terry import held_ratings
 from berteam_cli.records import team_name
 from berteam_cli.selector.observations import seen_in
@@ -87,7 +88,11 @@ def encounters(run: Run, parts: Parts, reference: Reference, each: int, rng: Gen
     members = policies(parts.optimizer.islands, run.population, explore=False)
     acting = joined([members, fixed_policies(range(env.standard_policies))])
     theirs = np.repeat(reference.teams + run.population.size, each, axis=0)
-    scores = [met(run, parts, acting, theirs[first : first + BATCH], rng) for first in range(0, len(theirs), BATCH)]
+    scores = []
+    with progress("Meeting each opponent twice", 2 * len(theirs)) as tell:
+        for first in range(0, len(theirs), BATCH):
+            scores.append(met(run, parts, acting, theirs[first : first + BATCH], rng))
+            tell(2 * scores[-1].shape[1])
     before, after = np.concatenate(scores, axis=1).reshape(2, len(reference.teams), each)
     return Encounters(reference, before, after)
 

@@ -11,9 +11,10 @@ from berteam_cli.acting import Policies
 from berteam_cli.evaluation.tournament import schedule
 from berteam_cli.games import Games, as_side_0, both_sides
 from berteam_cli.outcomes import Floats, Ints
+from berteam_cli.progress import progress
 
 GAMES_PER_PAIR = 8  # every order of the members of teams of two, from both sides
-BATCH = 20_000  # games played at a time, which bounds the memory of their outcomes
+BATCH = 2_000  # games played between two words of how far it is
 
 
 @dataclass(frozen=True)
@@ -56,12 +57,14 @@ def payoffs(games: Games, policies: Policies, teams: Ints, games_per_pair: int, 
     counts = np.zeros((3, size, size))  # won, drawn, lost by the row
     first, second = np.triu_indices(size)
     pairs = max(1, BATCH // games_per_pair)
-    for start in range(0, len(first), pairs):
-        i, j = first[start : start + pairs], second[start : start + pairs]
-        lineups = both_sides(*schedule(teams, i, j, games_per_pair, 2, rng), games_per_pair)
-        outcomes, _ = games.play(policies, lineups, int(rng.integers(2**63)))
-        scores = as_side_0(outcomes, games_per_pair).scores[:, 0].reshape(len(i), games_per_pair)
-        counts[:, i, j] = [(scores == result).sum(axis=1) for result in (1.0, 0.5, 0.0)]
+    with progress("Playing all teams against each other", len(first) * games_per_pair) as tell:
+        for start in range(0, len(first), pairs):
+            i, j = first[start : start + pairs], second[start : start + pairs]
+            lineups = both_sides(*schedule(teams, i, j, games_per_pair, 2, rng), games_per_pair)
+            outcomes, _ = games.play(policies, lineups, int(rng.integers(2**63)))
+            scores = as_side_0(outcomes, games_per_pair).scores[:, 0].reshape(len(i), games_per_pair)
+            counts[:, i, j] = [(scores == result).sum(axis=1) for result in (1.0, 0.5, 0.0)]
+            tell(len(i) * games_per_pair)
     won, drawn, lost = counts / games_per_pair
     wins = np.triu(won, 1) + np.triu(lost, 1).T + np.diag((won + lost).diagonal() / 2)
     return Payoffs(wins, np.triu(drawn) + np.triu(drawn, 1).T)
