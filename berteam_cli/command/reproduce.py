@@ -22,6 +22,7 @@ from berteam_cli.errors import InputError
 from berteam_cli.evaluation.paper import Reproduced, rows
 from berteam_cli.folder import CONFIG, MANIFEST, read_manifest
 from berteam_cli.records import COLUMNS, EVALUATION, write_table
+from berteam_cli.report.drawing import check_matplotlib
 from berteam_cli.stored import plain_config, write_config
 
 GAMES_PER_PAIR, BETWEEN, AGAINST = 10, 10_000, 1_000  # of an evaluation and of a comparison, at scale 1
@@ -60,11 +61,12 @@ def reproduce(config: ReproduceConfig, text: str, folder: Path | None = None) ->
         folder: None has outputs/reproduce/<what>_<scale>.
 
     Raises:
-        InputError: the folder holds something else.
+        InputError: the folder holds something else, or matplotlib is missing.
         RunError: a part failed.
         KeyboardInterrupt: it was interrupted; the same command goes on.
     """
     folder = folder or Path("outputs", "reproduce", f"{config.what}_{config.scale:g}")
+    check_matplotlib()  # which the report needs at the very end
     begin(folder, config, text)
     work = Work(config, folder)
     runs = {

@@ -103,7 +103,7 @@ def begun(sheet: Path, done: npt.NDArray, name: str) -> int:
         data = kept.read_bytes() if same else b""
     except (OSError, ValueError, AttributeError):
         data = b""
-    whole = len(data) // size
+    whole = min(len(data) // size, len(done))
     if whole < len(done):
         whole -= whole % BATCH
     rows = np.frombuffer(data[: whole * size], dtype=done.dtype)
