@@ -18,25 +18,34 @@ def clock(monkeypatch):
     return now
 
 
-def test_lines_come_after_two_seconds_and_then_every_ten(clock, caplog, monkeypatch):
-    monkeypatch.setattr(logging.getLogger("berteam"), "propagate", True)
-    caplog.set_level(logging.INFO, "berteam")
+@pytest.fixture
+def told(monkeypatch):
+    """The lines of the log."""
+    lines, log, handler = [], logging.getLogger("berteam"), logging.Handler()
+    handler.emit = lambda record: lines.append(record.getMessage())
+    monkeypatch.setattr(log, "handlers", [handler])
+    monkeypatch.setattr(log, "level", logging.INFO)
+    log.manager._clear_cache()
+    yield lines
+    log.manager._clear_cache()
+
+
+def test_lines_come_after_two_seconds_and_then_every_ten(clock, told):
     with progress("Rating 28 teams", 4000) as tell:
         for second in range(1, 41):
             clock["s"] = float(second)
             tell(100)
-    assert [record.message for record in caplog.records] == [
+    assert told == [
         f"Rating 28 teams: {done:,} of 4,000 games, 100 a second, {left} s left"
         for done, left in ((200, 38), (1200, 28), (2200, 18), (3200, 8))
     ]
 
 
-def test_nothing_is_said_of_quick_work(clock, caplog):
-    caplog.set_level(logging.INFO, "berteam")
+def test_nothing_is_said_of_quick_work(clock, told):
     with progress("Quick", 10) as tell:
         clock["s"] = 1.9
         tell(10)
-    assert not caplog.records
+    assert not told
 
 
 def test_a_terminal_has_a_bar_with_rate_and_time(clock, monkeypatch):

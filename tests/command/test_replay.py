@@ -158,7 +158,7 @@ def test_help_and_config(berteam):
 
 def test_default_teams(tmp_path):
     rows = ["2-5", "0-2", "1-1"]
-    table = [",".join(COLUMNS["elo"]), *(f"{team},,{1},{0},{2},4,1,1,2,0.1,{k},,"
+    table = [",".join(COLUMNS["elo"]), *(f"{team},,{1},{0},{2},4,1,1,2,0.1,{k},,,,"
              for k, team in enumerate(rows, start=1))]  # fmt: skip
     (tmp_path / "elo.csv").write_text("\n".join(table) + "\n")
     assert strongest(tmp_path, None, None) == ("2-5", "0-2")
