@@ -120,9 +120,9 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
         check_logger(config.logger)
         build.parts(config, stored=goes_on(config, Path(config.out) if config.out else None))
     elif word == "tournament":
-        from berteam_cli.command import tournament  # noqa: PLC0415
+        from berteam_cli.command import entrants  # noqa: PLC0415
 
-        tournament.players(config, keys)
+        entrants.players(config, keys)
     elif word == "replay":
         from berteam_cli.command import replay  # noqa: PLC0415
 

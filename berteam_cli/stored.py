@@ -16,7 +16,7 @@ from berteam_cli.config import SCHEMAS
 from berteam_cli.config_commands import TrainConfig
 from berteam_cli.config_groups import IslandConfig
 from berteam_cli.errors import InputError
-from berteam_cli.folder import CONFIG
+from berteam_cli.folder import CONFIG, Manifest, claim
 
 MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation", "logger")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
@@ -101,6 +101,29 @@ def check_same(folder: Path, text: str) -> None:
                 f"{key} is {new.get(key)!r}, but the run in {folder} was begun with {old.get(key)!r}; "
                 f"it can only go on with the same."
             )
+
+
+def begun(folder: Path, on_exists: str, text: str, what: str, facts: dict[str, Any]) -> Manifest:
+    """Returns the manifest of a command's work that begins, or goes on, in ``folder``.
+
+    Args:
+        folder: where its tables go.
+        on_exists: error, overwrite or resume.
+        text: its config as yaml.
+        what: it is called.
+        facts: for the manifest.
+
+    Raises:
+        InputError: the folder is not free, or holds work of another config, or such as is done.
+    """
+    if on_exists == "resume" and (folder / CONFIG).exists():
+        check_same(folder, text)
+        if Manifest.of(folder).facts["status"] == "done":
+            raise InputError(f"out={folder} holds this {what} already, and it is done.")
+        return Manifest.resumed(folder)
+    claim(folder, on_exists)
+    write_config(folder, text)
+    return Manifest.begun(folder, **facts)
 
 
 def flat(config: Any, prefix: str = "") -> dict[str, Any]:

@@ -12,19 +12,19 @@ import numpy as np
 import pandas as pd
 from rich.console import Console
 
-from berteam_cli.command.inspect import printed, read_table
+from berteam_cli.command.inspect import narrow, printed, read_table
 from berteam_cli.config_commands import CompareConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.comparison import Comparison, Figures, Played, compared, counted, planned
 from berteam_cli.evaluation.contenders import Contender, algorithms, contenders
 from berteam_cli.evaluation.playing import forget, play_all
 from berteam_cli.evaluation.reference import reference
-from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
+from berteam_cli.folder import logging_to, new_folder
 from berteam_cli.games import Games
 from berteam_cli.outcomes import Ints
-from berteam_cli.rating.bootstrap import interval, superiority
+from berteam_cli.rating.bootstrap import superiority, with_interval
 from berteam_cli.records import COLUMNS, write_table
-from berteam_cli.stored import check_same, write_config
+from berteam_cli.stored import begun
 from berteam_cli.training import key
 from berteam_cli.workers import Workers, available_cores
 
@@ -50,15 +50,18 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
     names, of = algorithms(runs)
     seconds = [times(x.folder) for x in runs]
     folder = folder or new_folder("compare")
-    manifest = begun(folder, config, text, names, runs)
+    if any(folder.resolve() == x.folder.resolve() for x in runs):
+        raise InputError(f"out={folder} is one of the runs; choose another folder.")
+    broken = [x.broken for x in runs if x.broken]
+    facts = {"seed": config.seed, "algorithms": names, "runs": len(runs), "broken_off": broken}
+    manifest = begun(folder, config.on_exists, text, "comparison", facts)
     with (
         logging_to(folder),
         manifest.until_the_end(again=f"Go on with the same command, out={folder} on_exists=resume."),
     ):
         log.info("%s", folder)
-        for x in runs:
-            if x.broken:
-                log.info("%s.", x.broken)
+        for sentence in broken:
+            log.info("%s.", sentence)
         games = Games(runs[0].parts.games.env, Workers(config.workers or available_cores()))
         known = reference(games, config.reference_teams)
         rng = np.random.default_rng(config.seed)
@@ -76,25 +79,6 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
     return math.nan
 
 
-def begun(folder: Path, config: CompareConfig, text: str, names: list[str], runs: list[Contender]) -> Manifest:
-    """Returns the manifest of a comparison that begins, or goes on, in ``folder``.
-
-    Raises:
-        InputError: the folder is not free, or holds another comparison.
-    """
-    if config.on_exists == "resume" and (folder / CONFIG).exists():
-        check_same(folder, text)
-        if Manifest.of(folder).facts["status"] == "done":
-            raise InputError(f"out={folder} holds this comparison already, and it is done.")
-        return Manifest.resumed(folder)
-    if any(folder.resolve() == x.folder.resolve() for x in runs):
-        raise InputError(f"out={folder} is one of the runs; choose another folder.")
-    claim(folder, config.on_exists)
-    write_config(folder, text)
-    broken = [x.broken for x in runs if x.broken]
-    return Manifest.begun(folder, seed=config.seed, algorithms=names, runs=len(runs), broken_off=broken)
-
-
 def times(folder: Path) -> tuple[float, float]:
     """Returns the seconds that a run takes for an epoch of its agents, and for an update of its selector.
 
@@ -105,15 +89,8 @@ def times(folder: Path) -> tuple[float, float]:
     if timing is None or selector is None or not len(timing):
         return math.nan, math.nan
     updates = int((selector.updates > 0).sum())
-    return float(timing[list(AGENTS_S)].sum(axis=1).mean()), float(
-        timing.selector_s.sum()
-    ) / updates if updates else 0.0
-
-
-def with_interval(value: float, samples: np.ndarray) -> tuple[float, float, float]:
-    """Returns ``value`` and the ends of the 95 % interval of its ``samples``, NaN where they are."""
-    low, high = interval(samples)
-    return float(value), float(low), float(high)
+    agents = float(timing[list(AGENTS_S)].sum(axis=1).mean())
+    return agents, float(timing.selector_s.sum()) / updates if updates else 0.0
 
 
 def elos(figures: Figures, k: int) -> tuple[float, ...]:
@@ -159,21 +136,3 @@ def show(folder: Path) -> None:
     for name, title in zip(TABLES, titles, strict=True):
         console.print(printed(title, narrow(pd.read_csv(folder / f"{name}.csv"))))
         console.print(str(folder / f"{name}.csv"), highlight=False, soft_wrap=True)
-
-
-def narrow(table: pd.DataFrame) -> pd.DataFrame:
-    """Returns ``table`` with each figure and its interval in one column."""
-    for name in [x.removesuffix("_low") for x in table.columns if x.endswith("_low")]:
-        columns = [name, f"{name}_low", f"{name}_high"]
-        table[name] = [spoken(*row) for row in table[columns].itertuples(index=False)]
-        table = table.drop(columns=columns[1:])
-    return table
-
-
-def spoken(value: float, low: float, high: float) -> str:
-    """Returns a figure with its interval, as far as they are known."""
-    if math.isnan(value):
-        return ""
-    digits = 0 if abs(value) >= 100 else 3
-    known = "" if math.isnan(low) else f" [{low:.{digits}f}, {high:.{digits}f}]"
-    return f"{value:.{digits}f}{known}"

@@ -169,12 +169,7 @@ class Look:
         truth, exact = found.truth, learned.samples == 0
         called = names(self.parts.optimizer.islands, self.run.population)
         tables: Tables = {"elo": list(elo_rows(truth, called, found.samples, exact=exact))}
-        self.show(
-            "Strongest teams",
-            tables,
-            "elo",
-            ("games", "wins", "draws", "losses", "predicted_elo", "rank_low", "rank_high"),
-        )
+        self.show("Strongest teams", tables, "elo", UNSHOWN)
         tables["figures"] = self.dated(figures(found, learned, fresh, rng))
         self.show("Figures", tables, "figures", whole=True)
         if exact and len(truth.elos) >= FEWEST:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -159,3 +160,26 @@ def text(value: object) -> str:
             else f"{value:.2e}"
         )
     return str(value)
+
+
+def spoken(value: float, low: float, high: float) -> str:
+    """Returns a figure with its interval, as far as they are known."""
+    if math.isnan(value):
+        return ""
+    digits = 0 if abs(value) >= 100 else 3
+    known = "" if math.isnan(low) else f" [{low:.{digits}f}, {high:.{digits}f}]"
+    return f"{value:.{digits}f}{known}"
+
+
+def narrow(table: pd.DataFrame, told: Callable[[float, float, float], str] = spoken) -> pd.DataFrame:
+    """Returns ``table`` with each figure and its interval in one column, as ``told`` says them.
+
+    An interval without a name is of the column ``value``, or where there is none of ``elo``.
+    """
+    narrowed = table.copy()
+    for low in [x for x in table.columns if x == "low" or x.endswith("_low")]:
+        name = low.removesuffix("_low") if low != "low" else "value" if "value" in table.columns else "elo"
+        ends = [name, low, low.removesuffix("low") + "high"]
+        narrowed[name] = [told(*row) for row in table[ends].astype(float).itertuples(index=False)]
+        narrowed = narrowed.drop(columns=ends[1:])
+    return narrowed

@@ -10,9 +10,9 @@ from pathlib import Path
 import pandas as pd
 from rich.console import Console
 
-from berteam_cli.command.compare import compare, narrow
+from berteam_cli.command.compare import compare
 from berteam_cli.command.evaluate import evaluate
-from berteam_cli.command.inspect import printed
+from berteam_cli.command.inspect import narrow, printed
 from berteam_cli.command.report import report
 from berteam_cli.command.tournament import tournament
 from berteam_cli.command.train import train

@@ -14,7 +14,6 @@ import numpy as np
 from berteam_cli.command.entrants import players, runs_of, with_game_of
 from berteam_cli.command.inspect import show
 from berteam_cli.config_commands import TournamentConfig
-from berteam_cli.errors import InputError
 from berteam_cli.evaluation.certainty import (
     Cells,
     cells,
@@ -28,7 +27,7 @@ from berteam_cli.evaluation.certainty import (
 from berteam_cli.evaluation.rounds import forget_rounds, play_rounds
 from berteam_cli.evaluation.sequential import Sprt
 from berteam_cli.evaluation.tournament import Standings, counted, plays_every_order
-from berteam_cli.folder import CONFIG, Manifest, claim, logging_to, new_folder
+from berteam_cli.folder import logging_to, new_folder
 from berteam_cli.outcomes import SIDES, Floats
 from berteam_cli.rating.bootstrap import interval, rank_intervals, superiority
 from berteam_cli.rating.copies import chancy_teams, clusters
@@ -36,13 +35,11 @@ from berteam_cli.rating.davidson import davidson
 from berteam_cli.rating.paper import in_order, online_elos, squared_error_elos
 from berteam_cli.recording import game_rows, side_rows
 from berteam_cli.records import COLUMNS, SIDES_TABLE, team_name, team_names, write_table
-from berteam_cli.stored import check_same, write_config
+from berteam_cli.stored import begun
 
 log = logging.getLogger("berteam")
 
 VERDICTS = {1: "stronger", -1: "weaker", 0: "open"}
-
-__all__ = ["players", "tournament"]
 
 
 def tournament(config: TournamentConfig, text: str, folder: Path | None = None) -> float:
@@ -62,7 +59,7 @@ def tournament(config: TournamentConfig, text: str, folder: Path | None = None) 
         text = with_game_of(runs[0], text)
     folder = folder or new_folder("tournament")
     facts = {"seed": config.seed, "teams": len(entry.teams), "pairs": len(entry.teams) * (len(entry.teams) - 1) // 2}
-    manifest = begun(folder, config, text, facts | entry.facts)
+    manifest = begun(folder, config.on_exists, text, "tournament", facts | entry.facts)
     with logging_to(folder):
         log.info("%s", folder)
         log.info("%d teams, %d pairs, %d games each.", facts["teams"], facts["pairs"], config.games_per_pair)
@@ -84,22 +81,6 @@ def tournament(config: TournamentConfig, text: str, folder: Path | None = None) 
             forget_rounds(sheets)
     show(folder, 10)
     return math.nan
-
-
-def begun(folder: Path, config: TournamentConfig, text: str, facts: dict[str, Any]) -> Manifest:
-    """Returns the manifest of a tournament that begins, or goes on, in ``folder``.
-
-    Raises:
-        InputError: the folder is not free, or holds a tournament of another config.
-    """
-    if config.on_exists == "resume" and (folder / CONFIG).exists():
-        check_same(folder, text)
-        if Manifest.of(folder).facts["status"] == "done":
-            raise InputError(f"out={folder} holds this tournament already, and it is done.")
-        return Manifest.resumed(folder)
-    claim(folder, config.on_exists)
-    write_config(folder, text)
-    return Manifest.begun(folder, **facts)
 
 
 def write(

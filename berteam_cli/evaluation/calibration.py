@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.random import Generator
 
-from berteam_cli.evaluation.regression import Interval, line, ranks, with_interval
+from berteam_cli.evaluation.regression import line, ranks
 from berteam_cli.evaluation.strength import Strength
 from berteam_cli.evaluation.truth import Truth
 from berteam_cli.outcomes import Floats
-from berteam_cli.rating.bootstrap import RESAMPLES, interval
+from berteam_cli.rating.bootstrap import Interval, interval, redrawn, with_interval
 
 GROUPS = 10
 
@@ -43,11 +43,6 @@ def slope(predicted: Floats, elos: Floats, rng: Generator) -> Interval:
     again = redrawn(len(elos), rng)
     value = line(predicted[np.newaxis], elos[np.newaxis])[0][0]
     return with_interval(value, line(predicted[again], elos[again])[0])
-
-
-def redrawn(count: int, rng: Generator) -> np.ndarray:
-    """Returns (R, count) indices of ``count`` things, drawn anew."""
-    return rng.integers(count, size=(RESAMPLES, count))
 
 
 def deciles(found: Strength) -> Iterator[tuple[int, int, float, float, float, float]]:

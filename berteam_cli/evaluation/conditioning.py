@@ -14,6 +14,7 @@ from berteam_cli.games import as_side_0, both_sides, in_turn
 from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.population import policies
 from berteam_cli.progress import progress
+from berteam_cli.rating.bootstrap import with_interval
 from berteam_cli.rating.bradley_terry import held_ratings
 from berteam_cli.records import team_name
 from berteam_cli.selector.observations import seen_in
@@ -44,9 +45,9 @@ class Encounters:
         (bootstrap), both games of one together.
         """
         return {
-            "before": interval(self._elo(self.before), self._resampled(self.before)),
-            "after": interval(self._elo(self.after), self._resampled(self.after)),
-            "gain": interval(
+            "before": with_interval(self._elo(self.before), self._resampled(self.before)),
+            "after": with_interval(self._elo(self.after), self._resampled(self.after)),
+            "gain": with_interval(
                 self._elo(self.after) - self._elo(self.before),
                 self._resampled(self.after) - self._resampled(self.before),
             ),
@@ -66,12 +67,6 @@ class Encounters:
         opponents, each = scores.shape
         drawn = np.random.default_rng(0).integers(each, size=(RESAMPLES, opponents, each))
         return self._elos(np.take_along_axis(np.broadcast_to(scores, drawn.shape), drawn, axis=2).sum(axis=2))
-
-
-def interval(value: float, resampled: Floats) -> tuple[float, float, float]:
-    """Returns ``value`` and the 95 % interval that ``resampled`` ones span."""
-    low, high = np.quantile(resampled, [0.025, 0.975])
-    return value, float(low), float(high)
 
 
 def encounters(run: Run, parts: Parts, reference: Reference, each: int, rng: Generator) -> Encounters:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.evaluation.calibration import calibration
-from berteam_cli.evaluation.regression import Interval, with_interval
 from berteam_cli.evaluation.strength import Match, Strength
 from berteam_cli.evaluation.truth import Chosen, Truth
 from berteam_cli.outcomes import Floats
+from berteam_cli.rating.bootstrap import Interval, with_interval
 from berteam_cli.rating.bradley_terry import Z_95
 from berteam_cli.records import team_name
 from berteam_cli.selector.base import TeamDistribution

@@ -14,9 +14,8 @@ import pandas as pd
 from scipy.special import stdtrit
 
 from berteam_cli.command.inspect import read_table
+from berteam_cli.rating.bootstrap import Interval
 from berteam_cli.records import EVALUATION
-
-Interval = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -92,9 +91,7 @@ def coevolved(quantity: str, found: Reproduced) -> Interval:
         "expected Elo": ("figures", "expected_elo"),
         "R^2 of probability on Elo": ("regression", "r_squared"),
     }[quantity]
-    return over_seeds(
-        runs, lambda run: tuple(entry(run, place, "quantity", key)[["value", "low", "high"]].astype(float))
-    )
+    return over_seeds(runs, lambda run: interval_of(entry(run, place, "quantity", key), ("value", "low", "high")))
 
 
 def compared(quantity: str, found: Reproduced) -> Interval:

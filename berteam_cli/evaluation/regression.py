@@ -11,14 +11,11 @@ from numpy.random import Generator
 from scipy.stats import rankdata
 
 from berteam_cli.outcomes import Floats, Ints
-from berteam_cli.rating.bootstrap import RESAMPLES, interval
+from berteam_cli.rating.bootstrap import Interval, redrawn, with_interval
 
 FEWEST = 3  # teams of a line that says anything
 DIGITS = 10  # of a value that are not rounding, relative to the largest one
 ROUNDING = 10.0**-DIGITS
-
-Interval = tuple[float, float, float]
-"""A value, and the ends of its 95 % interval."""
 
 
 def regression(elos: Floats, probability: Floats, error_variance: Floats, rng: Generator) -> dict[str, Interval]:
@@ -35,9 +32,8 @@ def regression(elos: Floats, probability: Floats, error_variance: Floats, rng: G
         rng: the only source of chance.
     """
     count = len(elos)
-    drawn = rng.integers(count, size=(RESAMPLES, count))
     # One statistic after the other for all samples at once; the first row is the teams as they are.
-    rows: Ints = np.concatenate([np.arange(count)[np.newaxis], drawn])
+    rows: Ints = np.concatenate([np.arange(count)[np.newaxis], redrawn(count, rng)])
     found = figures(elos[rows], probability[rows], error_variance[rows])
     return {name: with_interval(values[0], values[1:]) for name, values in found.items()}
 
@@ -84,12 +80,3 @@ def scatter(values: Floats, deviations: Floats) -> Floats:
     """Returns (R,) the sum of squared ``deviations``, NaN where ``values`` differ by no more than rounding."""
     alike = np.abs(deviations).max(axis=1) <= ROUNDING * np.abs(values).max(axis=1)
     return np.where(alike, np.nan, (deviations**2).sum(axis=1))
-
-
-def with_interval(value: float, resampled: Floats) -> Interval:
-    """Returns ``value`` with the 95 % interval of the ``resampled`` ones that are known, if they nearly all are."""
-    known = resampled[~np.isnan(resampled)]
-    if np.isnan(value) or len(known) < 0.9 * len(resampled):
-        return float(value), float("nan"), float("nan")
-    low, high = interval(known)
-    return float(value), float(low), float(high)

@@ -13,7 +13,7 @@ from berteam_cli.evaluation.playing import play_all
 from berteam_cli.evaluation.sequential import Sprt
 from berteam_cli.evaluation.tournament import Plan, counted, planned, plays_every_order
 from berteam_cli.games import Games
-from berteam_cli.outcomes import Ints, Lineups, Outcomes
+from berteam_cli.outcomes import Ints, Lineups, Outcomes, joined_fields
 from berteam_cli.rating.copies import chancy_teams
 from berteam_cli.training import key
 
@@ -57,14 +57,8 @@ def play_rounds(
 
 def together(plan: Plan, more: Plan) -> Plan:
     """Returns the games of ``plan`` and then those of ``more``."""
-    one, two = plan.lineups, more.lineups
-    lineups = Lineups(
-        np.concatenate([one.teams, two.teams]),
-        np.concatenate([one.captains, two.captains]),
-        np.concatenate([one.log_chances, two.log_chances]),
-    )
-    held = np.concatenate([plan.first_held, more.first_held])
-    return Plan(lineups, np.concatenate([plan.pairs, more.pairs]), held)
+    lineups = Lineups(*joined_fields(plan.lineups, more.lineups))
+    return Plan(lineups, *joined_fields(plan, more)[1:])
 
 
 def forget_rounds(sheets: Path) -> None:

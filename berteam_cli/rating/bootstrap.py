@@ -27,6 +27,9 @@ TOLERANCE = 1e-6  # of a strength in nats: 0.0002 Elo
 FEW = 12  # games of one kind, up to which drawing by a table is faster
 LONGEST_STEP = 1.0  # of Newton's method, in nats: where the slope changes little
 
+Interval = tuple[float, float, float]
+"""A value, and the ends of its 95 % interval."""
+
 
 def held_samples(
     wins: Ints, draws: Ints, losses: Ints, anchors: Floats, rng: Generator, resamples: int = RESAMPLES
@@ -257,6 +260,20 @@ def interval(samples: Floats, axis: int = 0) -> tuple[Floats, Floats]:
     tail = 0.5 * (1.0 - CONFIDENCE)
     low, high = np.quantile(samples, [tail, 1.0 - tail], axis=axis)
     return low, high
+
+
+def with_interval(value: float, resampled: Floats) -> Interval:
+    """Returns ``value`` with the 95 % interval of the ``resampled`` ones that are known, if they nearly all are."""
+    known = resampled[~np.isnan(resampled)]
+    if np.isnan(value) or len(known) < 0.9 * len(resampled):
+        return float(value), float("nan"), float("nan")
+    low, high = interval(known)
+    return float(value), float(low), float(high)
+
+
+def redrawn(count: int, rng: Generator) -> Ints:
+    """Returns (R, count) indices of ``count`` things, drawn anew."""
+    return rng.integers(count, size=(RESAMPLES, count))
 
 
 def superiority(samples: Floats) -> Floats:

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from berteam_cli.command.inspect import read_table
+from berteam_cli.command.inspect import narrow, read_table
 from berteam_cli.report.source import Source
 
 COMPARISON = "comparison"
@@ -79,24 +79,13 @@ def compared(folder: Path) -> dict[str, pd.DataFrame]:
         InputError: one cannot be read.
     """
     tables = {said: read_table(folder, name, columns=()) for name, said in COMPARED.items()}
-    return {said: narrow(table.head(MOST_ROWS)) for said, table in tables.items() if table is not None}
+    return {said: narrow(table.head(MOST_ROWS), spread) for said, table in tables.items() if table is not None}
 
 
 def evaluated(source: Source) -> dict[str, pd.DataFrame]:
     """Returns the tables of a run's evaluation by what stands above them."""
     tables = {said: source.evaluated(name) for name, said in EVALUATED.items()}
-    return {said: narrow(x.drop(columns="epoch")) for said, x in tables.items() if x is not None and len(x)}
-
-
-def narrow(table: pd.DataFrame) -> pd.DataFrame:
-    """Returns ``table`` with each figure and its interval in one column; an interval without a name is of ``value``."""
-    told = table.copy()
-    for low in [x for x in table.columns if x == "low" or x.endswith("_low")]:
-        name = low.removesuffix("_low") if low != "low" else "value" if "value" in table.columns else "elo"
-        ends = [name, low, low.removesuffix("low") + "high"]
-        told[name] = [spread(*row) for row in table[ends].astype(float).itertuples(index=False)]
-        told = told.drop(columns=ends[1:])
-    return told
+    return {said: narrow(x.drop(columns="epoch"), spread) for said, x in tables.items() if x is not None and len(x)}
 
 
 def spread(value: float, low: float, high: float) -> str:
