@@ -97,7 +97,7 @@ SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row i
 BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
 EVALUATION = "evaluation"
 """The folder in a run's, where `berteam evaluate` writes."""
-SHEETS = ("played", "members", "replayed")
+SHEETS = ("played", "members", "replayed", "payoffs", "encounters")
 """Files there, without endings, that keep games until the tables are written."""
 SHEET_ENDINGS = (".games", ".json")
 

@@ -22,7 +22,7 @@ from berteam_cli.evaluation.equilibria import exploitability, total_variation
 from berteam_cli.evaluation.figures import Replayed, figures, replayed
 from berteam_cli.evaluation.likeness import likeness
 from berteam_cli.evaluation.manners import Manners, composition, member_rows, team_rows
-from berteam_cli.evaluation.playing import forget
+from berteam_cli.evaluation.sheet import forget
 from berteam_cli.evaluation.points import Points, point_rows, reference_points, why_not
 from berteam_cli.evaluation.reference import reference
 from berteam_cli.evaluation.regression import FEWEST, regression
@@ -40,7 +40,7 @@ from berteam_cli.training import EVALUATION as CHANCE
 from berteam_cli.training import Parts, Run, generator
 
 ENCOUNTERS = 40  # with each fixed team, to tell what having seen it is worth
-PLAYED, MEMBERS, REPLAYED = SHEETS
+PLAYED, MEMBERS, REPLAYED, PAYOFFS, MET = SHEETS
 UNSHOWN = ("games", "wins", "draws", "losses", "predicted_elo", "rank_low", "rank_high")
 
 TABLES = (
@@ -134,7 +134,7 @@ class Look:
         else:
             self.say("The selector has no embeddings of members to compare.")
         if parts.selector.answers and parts.selector.field.sides == 2:
-            tables |= conditioning_rows(run.epoch, encounters(run, parts, known, ENCOUNTERS, meeting))
+            tables |= conditioning_rows(run.epoch, encounters(run, parts, known, ENCOUNTERS, meeting, self.place / MET))
             title = f"Elo of the choice before and after a first game, {ENCOUNTERS} encounters with each fixed team"
             self.show(title, tables, "conditioning")
         return tables, facts
@@ -197,7 +197,7 @@ class Look:
         if reason:
             self.say(f"{reason}, so there are no reference points.")
             return {}
-        points = reference_points(self.run, self.parts, learned, self.config.payoff_games, rng)
+        points = reference_points(self.run, self.parts, learned, self.config.payoff_games, rng, self.place / PAYOFFS)
         tables: Tables = {"reference_points": point_rows(self.run, self.parts, points)}
         self.show("Teams, the most probable first", tables, "reference_points")
         self.console.print(printed("Mixes: exploitability, total variation from what was learnt", mixes(points)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.random import Generator
 
 from berteam_cli.acting import Policies, fixed_policies, joined
 from berteam_cli.evaluation.reference import Reference
+from berteam_cli.evaluation.sheet import Sheet, named
 from berteam_cli.games import as_side_0, both_sides, in_turn
 from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.population import policies
@@ -22,6 +24,7 @@ from berteam_cli.training import Parts, Run, key
 
 BATCH = 64  # an even number of encounters whose trajectories are held at once
 RESAMPLES = 1000  # of the bootstrap
+ROW = np.dtype([("before", "<f8"), ("after", "<f8")])  # what is kept of an encounter
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,9 @@ class Encounters:
         return self._elos(np.take_along_axis(np.broadcast_to(scores, drawn.shape), drawn, axis=2).sum(axis=2))
 
 
-def encounters(run: Run, parts: Parts, reference: Reference, each: int, rng: Generator) -> Encounters:
+def encounters(
+    run: Run, parts: Parts, reference: Reference, each: int, rng: Generator, sheet: Path | None = None
+) -> Encounters:
     """Returns what came of ``each`` encounters with every team of ``reference``.
 
     Args:
@@ -78,17 +83,26 @@ def encounters(run: Run, parts: Parts, reference: Reference, each: int, rng: Gen
         reference: teams of fixed policies.
         each: E; the sides change from one encounter to the next.
         rng: the only source of chance.
+        sheet: a file without ending that keeps the scores, batch by batch, as ``play_all`` does.
     """
-    env = parts.games.env
+    env, seed = parts.games.env, key(rng)
     members = policies(parts.optimizer.islands, run.population, explore=False)
     acting = joined([members, fixed_policies(range(env.standard_policies))])
     theirs = np.repeat(reference.teams + run.population.size, each, axis=0)
-    scores = []
+    scores = np.zeros((len(theirs), 2))
+    first, kept = 0, None
+    if sheet is not None:
+        kept = Sheet(sheet, named(parts.games, acting, [theirs], seed, BATCH), BATCH)
+        first = kept.begun(scores.view(ROW)[:, 0])
     with progress("Meeting each opponent twice", 2 * len(theirs)) as tell:
-        for first in range(0, len(theirs), BATCH):
-            scores.append(met(run, parts, acting, theirs[first : first + BATCH], rng))
-            tell(2 * scores[-1].shape[1])
-    before, after = np.concatenate(scores, axis=1).reshape(2, len(reference.teams), each)
+        tell(2 * first)
+        for start in range(first, len(theirs), BATCH):
+            part = slice(start, start + BATCH)
+            scores[part] = met(run, parts, acting, theirs[part], np.random.default_rng([seed, start // BATCH])).T
+            if kept is not None:
+                kept.add(scores[part])
+            tell(2 * len(theirs[part]))
+    before, after = scores.T.reshape(2, len(reference.teams), each)
     return Encounters(reference, before, after)
 
 

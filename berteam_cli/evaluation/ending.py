@@ -19,6 +19,7 @@ from berteam_cli.folder import Manifest
 from berteam_cli.outcomes import Floats
 from berteam_cli.population import names, policies
 from berteam_cli.rating.bootstrap import interval, rank_intervals
+from berteam_cli.rating.counts import independent
 from berteam_cli.recording import Recorder
 from berteam_cli.records import COLUMNS, team_name, write_table
 from berteam_cli.selector.base import team_count
@@ -96,7 +97,7 @@ def rate(
     """Returns the Elos of the ``chosen`` teams, and where those of their opponents come from."""
     parts = recorder.parts
     if len(chosen) == 0:
-        nobody = Truth(chosen, np.zeros(0), np.zeros(0), np.zeros((3, 0, 0), dtype=np.int64))
+        nobody = Truth(chosen, np.zeros(0), np.zeros(0), independent(*np.zeros((3, 0, 0), dtype=np.int64)))
         return nobody, "none: no team was rated"
     known: Reference = reference(parts.games, settings.reference_teams)
     members = policies(parts.optimizer.islands, run.population, explore=False)

@@ -28,10 +28,12 @@ class Manners:
     Attributes:
         ratios: (K, G) aggression in each game.
         made: tags, times_tagged, captures, grabs and wall_hits, (K,) each: means per game, of the team as a whole.
+        copies: (K, G) how often each game was played; 0 of those that are copies of an earlier one.
     """
 
     ratios: Floats
     made: dict[str, Floats]
+    copies: Ints
 
     @property
     def aggression(self) -> Floats:
@@ -39,19 +41,35 @@ class Manners:
         return self.ratios.mean(axis=1)
 
     def interval(self, rng: Generator) -> tuple[Floats, Floats]:
-        """Returns (K,) the ends of the 95 % intervals of the aggression, from drawing games anew (bootstrap)."""
-        games = self.ratios.shape[1]
-        times = rng.multinomial(games, np.full(games, 1 / games), size=RESAMPLES)
-        return interval(times @ self.ratios.T / games)
+        """Returns (K,) the ends of the 95 % intervals of the aggression, from drawing games anew (bootstrap).
+
+        A game and its copies are drawn together.
+        """
+        low, high = zip(*(interval(resampled(*team, rng)) for team in zip(self.ratios, self.copies, strict=True)))
+        return np.array(low), np.array(high)
 
 
-def manners(outcomes: Outcomes, teams: int) -> Manners:
-    """Returns how ``teams`` behaved that are side 0 in the record of every game, equally many in a row."""
+def resampled(ratios: Floats, copies: Ints, rng: Generator) -> Floats:
+    """Returns (R,) means of (G,) ``ratios`` of games drawn anew, which have so many ``copies``."""
+    first = np.flatnonzero(copies)
+    times = rng.multinomial(len(first), np.full(len(first), 1 / len(first)), size=RESAMPLES) * copies[first]
+    return times @ ratios[first] / times.sum(axis=1)
+
+
+def manners(outcomes: Outcomes, copies: Ints) -> Manners:
+    """Returns how K teams behaved that are side 0 in the record of every game, equally many in a row.
+
+    Args:
+        outcomes: of K G games.
+        copies: (K, G) how often each was played; see ``Manners``.
+    """
+    teams = len(copies)
     counts = {name: outcomes.event(name)[:, 0] for name in ("tags", "captures", "grabs", "wall_hits")}
     counts["times_tagged"] = outcomes.event("tags")[:, 1]
     return Manners(
         aggression(outcomes).reshape(teams, -1),
         {name: count.reshape(teams, -1).mean(axis=1) for name, count in counts.items()},
+        copies,
     )
 
 

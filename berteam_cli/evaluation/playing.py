@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import logging
 from pathlib import Path
 
@@ -11,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from berteam_cli.acting import Policies
+from berteam_cli.evaluation.sheet import Sheet, named
 from berteam_cli.games import Games
 from berteam_cli.outcomes import EVENTS, Lineups, Outcomes
 from berteam_cli.progress import progress
-from berteam_cli.records import SHEET_ENDINGS
 from berteam_cli.training import key
 
 log = logging.getLogger("berteam")
@@ -38,9 +36,10 @@ def play_all(
     """
     record = record_of(games.env.sides)
     done = np.zeros(len(lineups), dtype=record)
-    first = 0
+    first, kept = 0, None
     if sheet is not None:
-        first = begun(sheet, done, named(games, policies, lineups, seed))
+        kept = Sheet(sheet, named(games, policies, columns(lineups), seed, BATCH), BATCH)
+        first = kept.begun(done)
         if first:
             log.info("%s: going on after %s games.", title, f"{first:,}")
     with progress(title, len(lineups)) as tell:
@@ -52,9 +51,8 @@ def play_all(
             rows = done[part]
             rows["scores"], rows["steps"] = outcomes.scores, outcomes.steps
             rows["events"], rows["seed"] = outcomes.events, outcomes.seeds
-            if sheet is not None:
-                with sheet.with_suffix(".games").open("ab") as file:
-                    file.write(rows.tobytes())
+            if kept is not None:
+                kept.add(rows)
             tell(len(rows))
     return Outcomes(
         lineups,
@@ -63,12 +61,6 @@ def play_all(
         done["events"].astype(np.int64),
         done["seed"].astype(np.uint64),
     )
-
-
-def forget(sheet: Path) -> None:
-    """Removes what ``play_all`` kept: its tables are written."""
-    for ending in SHEET_ENDINGS:
-        sheet.with_suffix(ending).unlink(missing_ok=True)
 
 
 def columns(lineups: Lineups) -> tuple[npt.NDArray, ...]:
@@ -81,34 +73,3 @@ def record_of(sides: int) -> np.dtype:
     return np.dtype(
         [("scores", "<f8", (sides,)), ("steps", "<u4"), ("events", "<u4", (sides, len(EVENTS))), ("seed", "<u8")]
     )
-
-
-def named(games: Games, policies: Policies, lineups: Lineups, seed: int) -> str:
-    """Returns a name that only the same games of the same players have."""
-    digest = hashlib.sha256(json.dumps([games.env.fingerprint(), seed, BATCH], sort_keys=True).encode())
-    for array in (*policies, *columns(lineups)):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
-
-
-def begun(sheet: Path, done: npt.NDArray, name: str) -> int:
-    """Reads the games kept in ``sheet`` into ``done`` and returns how many they are, whole batches only.
-
-    A sheet of other games is begun anew.
-    """
-    about, kept = sheet.with_suffix(".json"), sheet.with_suffix(".games")
-    size = done.dtype.itemsize
-    try:
-        same = json.loads(about.read_text(encoding="utf-8")).get("games") == name
-        data = kept.read_bytes() if same else b""
-    except (OSError, ValueError, AttributeError):
-        data = b""
-    whole = min(len(data) // size, len(done))
-    if whole < len(done):
-        whole -= whole % BATCH
-    rows = np.frombuffer(data[: whole * size], dtype=done.dtype)
-    done[:whole] = rows
-    sheet.parent.mkdir(parents=True, exist_ok=True)
-    kept.write_bytes(data[: whole * size])
-    about.write_text(json.dumps({"games": name}), encoding="utf-8")
-    return whole

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,12 +59,17 @@ def why_not(parts: Parts, learned: TeamDistribution, most: int) -> str:
     return ""
 
 
-def reference_points(run: Run, parts: Parts, learned: TeamDistribution, games_per_pair: int, rng: Generator) -> Points:
-    """Returns the reference points of all teams of ``run``, after each played each; ``learned`` is exact."""
+def reference_points(
+    run: Run, parts: Parts, learned: TeamDistribution, games_per_pair: int, rng: Generator, sheet: Path | None = None
+) -> Points:
+    """Returns the reference points of all teams of ``run``, after each played each; ``learned`` is exact.
+
+    What is played is kept in ``sheet``; see ``play_all``.
+    """
     field = parts.selector.field
     learned = with_all_teams(learned, field)
     acting = policies(parts.optimizer.islands, run.population, explore=False)
-    played = payoffs(parts.games, acting, learned.teams, games_per_pair, rng)
+    played = payoffs(parts.games, acting, learned.teams, games_per_pair, rng, sheet)
     # In proportion to the orders in which the members of each team may stand.
     orders = distribution(anybody(field), field).probability
     limit = replicator(played.wins, orders / orders.sum(), STEPS)[-1]

@@ -89,5 +89,5 @@ class Match:
 
     def observed(self, matches: Fixture, outcomes: Outcomes) -> Manners:
         """Returns how our teams behaved in ``matches``, of two sides."""
-        teams, anchors, each = matches.shape
-        return manners(as_side_0(outcomes, anchors * each), teams)
+        _, anchors, each = matches.shape
+        return manners(as_side_0(outcomes, anchors * each), matches.copies)

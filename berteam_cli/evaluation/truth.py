@@ -14,11 +14,13 @@ from scipy.special import stdtrit
 from berteam_cli.acting import Policies, fixed_policies, joined
 from berteam_cli.evaluation.playing import play_all
 from berteam_cli.evaluation.reference import Reference
-from berteam_cli.evaluation.tournament import schedule
+from berteam_cli.evaluation.tournament import plays_every_order, schedule
 from berteam_cli.games import Games, arrangements, placed
 from berteam_cli.outcomes import Bools, Floats, Ints, Lineups, Outcomes
 from berteam_cli.rating.bootstrap import RESAMPLES, held_samples
 from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, Z_95, expected, held_ratings
+from berteam_cli.rating.copies import chancy_teams, clusters
+from berteam_cli.rating.counts import POINTS, Counts, counts
 from berteam_cli.rating.elo import POINTS_PER_NAT, nats, points
 from berteam_cli.selector.base import TeamDistribution
 from berteam_cli.training import key
@@ -56,18 +58,18 @@ class Truth:
         chosen: the teams.
         elos: (K,).
         half_widths: (K,) of their 95 % intervals.
-        results: (3, K, J) games won, drawn and lost against each of J teams of fixed policies.
+        counts: of their games against each of J teams of fixed policies.
     """
 
     chosen: Chosen
     elos: Floats
     half_widths: Floats
-    results: Ints
+    counts: Counts
 
     @property
     def record(self) -> Ints:
         """(3, K) games won, drawn and lost."""
-        return self.results.sum(axis=2)
+        return self.counts.results.sum(axis=2)
 
     def expected_elo(self) -> tuple[float, float]:
         """Returns the Elo of a team that the selector chooses, and its 95 % half width.
@@ -178,12 +180,21 @@ class Fixture:
         lineups: K J G games, those of a team in a row.
         held: (K J G, S) the sides where our team stands.
         shape: (K, J, G).
+        clusters: (K J G,) the first game of which each is a copy.
+        settled: (K, J) whether all that can happen between the two is played.
     """
 
     acting: Policies
     lineups: Lineups
     held: Bools
     shape: tuple[int, int, int]
+    clusters: Ints
+    settled: Bools
+
+    @property
+    def copies(self) -> Ints:
+        """(K, J G) how often each of a team's games is played; 0 of those that are copies of an earlier one."""
+        return np.bincount(self.clusters, minlength=len(self.clusters)).reshape(self.shape[0], -1)
 
 
 def fixture(
@@ -209,11 +220,19 @@ def fixture(
     played = schedule(everyone, first, second + ours, games_per_pair, len(ways), rng)
     held = ways[np.arange(ours * anchors * games_per_pair) % (anchors * games_per_pair) % len(ways)]
     acting = joined([members, fixed_policies(range(games.env.standard_policies))])
-    return Fixture(acting, placed(*played, held), held, (ours, anchors, games_per_pair))
+    lineups = placed(*played, held)
+    chance = chancy_teams(games.env, acting, everyone)
+    settled = ~(chance[:ours, np.newaxis] | chance[ours:])
+    settled &= plays_every_order(games.env.sides, everyone, games_per_pair)
+    alike = clusters(games.env, acting, lineups.teams)
+    return Fixture(acting, lineups, held, (ours, anchors, games_per_pair), alike, settled)
 
 
 def rated(chosen: Chosen, reference: Reference, fixture: Fixture, outcomes: Outcomes) -> Truth:
-    """Returns the Elos of the ``chosen`` teams, from the ``outcomes`` of their ``fixture`` with ``reference``."""
+    """Returns the Elos of the ``chosen`` teams, from the ``outcomes`` of their ``fixture`` with ``reference``.
+
+    The half widths are those of the Fisher information, of as many games as would be as sure as these and their copies.
+    """
     held, anchors, sides = fixture.held, len(reference.teams), outcomes.scores.shape[1]
     made = np.where(held, outcomes.scores, 0.0).sum(axis=1).reshape(fixture.shape)
     left = np.where(held, 0.0, outcomes.scores).sum(axis=1).reshape(fixture.shape)
@@ -229,8 +248,9 @@ def rated(chosen: Chosen, reference: Reference, fixture: Fixture, outcomes: Outc
         np.tile(reference.elos, len(handicaps)),
         np.concatenate(handicaps),
     )
-    won, lost = (left == 0.0).sum(axis=2), (made == 0.0).sum(axis=2)
-    return Truth(chosen, elos, half_widths, np.stack([won, fixture.shape[2] - won - lost, lost]))
+    kinds = np.where(left == 0.0, 0, np.where(made == 0.0, 2, 1)).ravel()
+    found = counts(kinds, fixture.clusters, fixture.shape, fixture.settled)
+    return Truth(chosen, elos, half_widths * np.sqrt(found.repetition), found)
 
 
 def truth(
@@ -254,26 +274,27 @@ def elo_samples(found: Truth, reference: Reference, sides: int, rng: Generator) 
     distribution of the Fisher information.
     """
     if sides == 2:
-        return held_samples(*found.results, reference.elos, rng)
+        return held_samples(found.counts, reference.elos, rng)
     return found.elos + found.half_widths / Z_95 * rng.standard_normal((RESAMPLES, len(found.elos)))
 
 
 def replay_variance(found: Truth, reference: Reference) -> Floats:
     """Returns (K,) the variance of each Elo over repetitions of the same games, NaN where a pair met only once.
 
-    From how the scores against one opponent scatter around their own mean. Games drawn anew (``elo_samples``) scatter
-    more: they also differ in who was met how often, and where a team fares better against some opponents and worse
-    against others than two Elos can say, that counts as noise.
+    From how the scores against one opponent scatter around their own mean; what is settled does not scatter. Games
+    drawn anew (``elo_samples``) scatter more: they also differ in who was met how often, and where a team fares better
+    against some opponents and worse against others than two Elos can say, that counts as noise.
 
     Args:
         found: Elos from games of two sides.
         reference: whom they met.
     """
-    won, drawn, _ = found.results
-    games = found.results.sum(axis=0).astype(float)
-    made = won + 0.5 * drawn
+    games, made = found.counts.results.sum(axis=0).astype(float), np.tensordot(POINTS, found.counts.results, axes=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        scatter = (won + 0.25 * drawn - made**2 / games) * games / (games - 1)
+        off = (POINTS[:, np.newaxis, np.newaxis] - made / games) ** 2  # (3, K, J)
+        often = found.counts.different.sum(axis=(0, 3)).astype(float)
+        scatter = (off * (found.counts.different @ found.counts.copies**2)).sum(axis=0) * often / (often - 1)
+    scatter = np.where(found.counts.settled, 0.0, scatter)
     chances = expected(nats(found.elos)[:, np.newaxis], nats(reference.elos))
     information = (games * chances * (1 - chances)).sum(axis=1) + PRIOR_DRAWS / 4
     return (POINTS_PER_NAT / information) ** 2 * scatter.sum(axis=1)

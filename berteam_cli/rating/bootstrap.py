@@ -19,6 +19,7 @@ from numpy.random import Generator
 
 from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.rating.bradley_terry import PRIOR_DRAWS
+from berteam_cli.rating.counts import Counts
 from berteam_cli.rating.elo import nats, points
 
 CONFIDENCE = 0.95
@@ -31,22 +32,18 @@ Interval = tuple[float, float, float]
 """A value, and the ends of its 95 % interval."""
 
 
-def held_samples(
-    wins: Ints, draws: Ints, losses: Ints, anchors: Floats, rng: Generator, resamples: int = RESAMPLES
-) -> Floats:
+def held_samples(games: Counts, anchors: Floats, rng: Generator, resamples: int = RESAMPLES) -> Floats:
     """Returns (R, K) Elos of players who met only opponents of known Elo, one row for each resample of their games.
 
     Args:
-        wins: (K, J) games that player k won against anchor j.
-        draws: (K, J) games drawn.
-        losses: (K, J) games lost.
+        games: of K players against J anchors; a game and its copies are drawn together.
         anchors: (J,) Elo of the anchors, held.
         rng: draws the games.
         resamples: R.
     """
-    counts = np.stack([wins, draws, losses], axis=2).astype(np.float64)
+    different = np.ascontiguousarray(games.different.transpose(1, 2, 0, 3), dtype=np.float64)
     held = np.asarray(nats(np.asarray(anchors, dtype=np.float64)), dtype=np.float64)
-    return np.asarray(points(held_strengths(counts, held, rng, resamples)))
+    return np.asarray(points(held_strengths(different, games.copies.astype(np.float64), held, rng, resamples)))
 
 
 def samples(
@@ -156,16 +153,19 @@ def free_strengths(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def held_strengths(counts: np.ndarray, held: np.ndarray, rng: Generator, resamples: int) -> np.ndarray:
+def held_strengths(
+    counts: np.ndarray, copies: np.ndarray, held: np.ndarray, rng: Generator, resamples: int
+) -> np.ndarray:
     """Returns (R, K) strengths in nats.
 
     Args:
-        counts: (K, J, 3) float64 games won, drawn and lost.
+        counts: (K, J, 3, M) float64 different games won, drawn and lost.
+        copies: (M,) float64 how often each was played.
         held: (J,) strengths of the anchors, nats.
         rng: draws the games.
         resamples: R.
     """
-    players, anchors, _ = counts.shape
+    players, anchors, _, repetitions = counts.shape
     found = np.empty((resamples, players))
     games = np.empty(anchors)
     for k in range(players):
@@ -176,10 +176,11 @@ def held_strengths(counts: np.ndarray, held: np.ndarray, rng: Generator, resampl
             for j in range(anchors):
                 games[j] = 0.0
                 for result in range(3):
-                    if counts[k, j, result] > 0.0:
-                        drawn = times(counts[k, j, result], rng)
-                        games[j] += drawn
-                        made += drawn * (1.0 - 0.5 * result)
+                    for m in range(repetitions):
+                        if counts[k, j, result, m] > 0.0:
+                            drawn = times(counts[k, j, result, m], rng) * copies[m]
+                            games[j] += drawn
+                            made += drawn * (1.0 - 0.5 * result)
             strength = root(games, held, made, prior, strength)
             found[r, k] = strength
     return found

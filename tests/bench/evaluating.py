@@ -14,6 +14,7 @@ from berteam_cli.evaluation.truth import fixture
 from berteam_cli.games import Games, pairings
 from berteam_cli.population import policies
 from berteam_cli.rating.bootstrap import held_samples, samples
+from berteam_cli.rating.counts import independent
 from berteam_cli.selector.base import unordered_teams
 from berteam_cli.training import begin
 from berteam_cli.workers import Workers, available_cores
@@ -52,9 +53,9 @@ def bootstrap_rows() -> Iterator[Row]:
     rng = np.random.default_rng(0)
     counts = rng.multinomial(10, [0.2, 0.5, 0.3], size=(1830, 28)).transpose(2, 0, 1)
     anchors = rng.normal(1000, 150, 28)
-    held_samples(*counts[:, :2], anchors, rng, 2)
+    held_samples(independent(*counts[:, :2]), anchors, rng, 2)
     started = time.perf_counter()
-    held_samples(*counts, anchors, rng)
+    held_samples(independent(*counts), anchors, rng)
     yield "bootstrap of 1,830 teams, 280 games each, 1,000 resamples", f"{time.perf_counter() - started:.1f} s", "20 s"
     upper = np.triu(rng.multinomial(8, [0.3, 0.4, 0.3], size=(100, 100)).transpose(2, 0, 1), 1)
     wins, draws = upper[0] + upper[2].T, upper[1] + upper[1].T

@@ -9,8 +9,9 @@ import pytest
 from scipy.stats import linregress
 
 from berteam_cli.env.rps import Rps
-from berteam_cli.evaluation import playing
-from berteam_cli.records import COLUMNS
+from berteam_cli.evaluation import conditioning, playing
+from berteam_cli.games import Games
+from berteam_cli.records import COLUMNS, SHEETS
 from tests.command.conftest import SMALL_BERTEAM, TINY
 
 HANDS = ["env=rps", "population=hands", "optimizer=fixed", "evaluation.games=0", "games_per_epoch=8", "record_every=2"]
@@ -214,6 +215,39 @@ def test_it_goes_on_where_it_was_interrupted(berteam, tmp_path, monkeypatch):
     shutil.rmtree(place)
     berteam("evaluate", "run")
     assert tables(place) == cut
+
+
+def test_wherever_it_is_interrupted_it_ends_the_same(berteam, tmp_path, monkeypatch):
+    """Before each of its batches in turn: of the ratings, of the replays, of all teams, and of the encounters."""
+    berteam("train", "experiment=unknown_opponent", "epochs=2", "out=run")
+    monkeypatch.setattr(playing, "BATCH", 400)
+    monkeypatch.setattr(conditioning, "BATCH", 32)
+    play, calls, last = Games.play, [], [0]
+
+    def interrupted(*call, **named):
+        if len(calls) == last[0]:
+            raise KeyboardInterrupt
+        calls.append(0)
+        return play(*call, **named)
+
+    place, words = tmp_path / "run" / "evaluation", ("run", "games_per_pair=20", "replay_games=200", "workers=1")
+    last[0] = -1
+    monkeypatch.setattr(Games, "play", interrupted)
+    berteam("evaluate", *words)
+    whole, needed = tables(place), len(calls)
+    assert {"reference_points.csv", "encounters.csv"} <= whole.keys()
+    shutil.rmtree(place)
+    calls.clear()
+    commands = 0
+    while not tables(place):
+        last[0] = len(calls) + 4  # of which one is the reference's, and a batch of encounters takes two
+        berteam("evaluate", *words, code=(0, 130))
+        commands += 1
+        assert commands < needed
+    assert tables(place) == whole
+    assert commands > 4
+    assert len(calls) <= needed + 2 * commands  # again only the reference's, and half a batch of encounters
+    assert not [path for name in SHEETS for path in place.glob(f"{name}.*") if path.suffix != ".csv"]
 
 
 def interrupting(play, after):

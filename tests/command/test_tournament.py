@@ -155,6 +155,30 @@ def test_a_cut_tournament_goes_on(berteam, tmp_path, monkeypatch):
     assert "it is done" in berteam(*words, "workers=1", "out=cut", "on_exists=resume", code=2).stderr
 
 
+def test_a_sequential_tournament_goes_on_from_its_second_round(berteam, tmp_path, monkeypatch):
+    words = (*HANDS, "games_per_pair=10", "action_noise=0.3", "sprt.rounds=6", "workers=1")
+    play, calls, last = Games.play, [], [-1]
+
+    def interrupted(*call, **named):
+        if len(calls) == last[0]:
+            last[0] = -1
+            raise KeyboardInterrupt
+        calls.append(0)
+        return play(*call, **named)
+
+    monkeypatch.setattr(Games, "play", interrupted)
+    berteam(*words, "out=whole")
+    rounds = len(calls)
+    assert rounds > 3
+    calls.clear()
+    last[0] = 2
+    berteam(*words, "out=cut", code=130)
+    berteam(*words, "out=cut", "on_exists=resume")
+    assert len(calls) == rounds  # none was played twice
+    for path in (tmp_path / "whole").glob("*.csv"):
+        assert path.read_bytes() == (tmp_path / "cut" / path.name).read_bytes(), path.name
+
+
 def test_pairs_play_until_it_is_clear_who_is_stronger(berteam, tmp_path):
     noisy = (*HANDS, "games_per_pair=10", "action_noise=0.3", "sprt.rounds=60")
     for workers in (1, 2):

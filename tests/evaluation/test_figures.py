@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from berteam_cli.acting import fixed_policies
+from berteam_cli.acting import fixed_policies, noisy
 from berteam_cli.env.rps import Rps
 from berteam_cli.evaluation.calibration import calibration, deciles
 from berteam_cli.evaluation.figures import Replayed, figures, picked, replayed
@@ -12,6 +12,7 @@ from berteam_cli.evaluation.strength import Match, Strength
 from berteam_cli.evaluation.truth import Chosen, Truth
 from berteam_cli.games import Games
 from berteam_cli.rating.bradley_terry import Z_95
+from berteam_cli.rating.counts import independent
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
 from berteam_cli.workers import Workers
 
@@ -26,7 +27,7 @@ def measured(probability, seed, error=GAMES_ERROR):
     count = len(TEAMS)
     chosen = Chosen(TEAMS, probability, np.ones(count, bool), np.zeros(count, int), 1.0)
     elos = TRUE + rng.normal(0, error, count)
-    truth = Truth(chosen, elos, np.full(count, Z_95 * error), np.zeros((3, count, 1), int))
+    truth = Truth(chosen, elos, np.full(count, Z_95 * error), independent(*np.zeros((3, count, 1), int)))
     return Strength(truth, elos + rng.normal(0, error, (1000, count)), np.full(count, error**2), None)
 
 
@@ -115,9 +116,9 @@ def test_deciles_by_hand():
 
 
 def hands(workers=1):
-    """Returns all pairs of hands against two of them, rock and paper."""
+    """Returns all pairs of hands, which slip now and then, against two of them, rock and paper."""
     known = Reference(np.array([[0, 0], [1, 1]]), np.array([950.0, 1050.0]), "by hand")
-    return Match(Games(Rps(2), Workers(workers)), fixed_policies(range(3)), known)
+    return Match(Games(Rps(2), Workers(workers)), noisy(fixed_policies(range(3)), 0.1), known)
 
 
 def pairs(probability):

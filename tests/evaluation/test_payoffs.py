@@ -3,9 +3,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from berteam_cli.acting import fixed_policies, joined
+from berteam_cli.acting import fixed_policies, joined, noisy
 from berteam_cli.env.rps import Rps
-from berteam_cli.evaluation import payoffs as module
+from berteam_cli.evaluation import playing
 from berteam_cli.evaluation.payoffs import payoff_steps, payoffs
 from berteam_cli.evaluation.tournament import tournament
 from berteam_cli.games import Games, pairings
@@ -79,8 +79,30 @@ def test_neither_the_workers_nor_the_batches_change_the_chances_of_fixed_policie
 
     whole = measured(1)
     np.testing.assert_array_equal(whole, measured(2))
-    monkeypatch.setattr(module, "BATCH", 16)
+    monkeypatch.setattr(playing, "BATCH", 16)
     np.testing.assert_array_equal(whole, measured(1))
+
+
+def test_what_is_kept_is_not_played_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(playing, "BATCH", 50)
+    acting, teams, play, left = noisy(fixed_policies(range(3)), 0.3), unordered_teams(3, 2), Games.play, [2]
+
+    def measured(sheet=None):
+        return payoffs(rps(2), acting, teams, 8, np.random.default_rng(0), sheet).wins
+
+    def until(*call, **named):
+        left[0] -= 1
+        if left[0] < 0:
+            raise KeyboardInterrupt
+        return play(*call, **named)
+
+    whole = measured()
+    monkeypatch.setattr(Games, "play", until)
+    with pytest.raises(KeyboardInterrupt):
+        measured(tmp_path / "payoffs")
+    left[0] = 2  # 21 pairs of 8 games are four batches, two of which are kept
+    np.testing.assert_array_equal(measured(tmp_path / "payoffs"), whole)
+    assert left[0] == 0
 
 
 def test_steps():

@@ -6,7 +6,8 @@ import pytest
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
 from berteam_cli.evaluation import playing
-from berteam_cli.evaluation.playing import forget, play_all
+from berteam_cli.evaluation.playing import play_all
+from berteam_cli.evaluation.sheet import forget
 from berteam_cli.games import Games, pairings
 from berteam_cli.workers import Workers
 

@@ -7,6 +7,7 @@ from berteam_cli.evaluation.reference import Reference, reference
 from berteam_cli.evaluation.truth import Chosen, Truth, choose_teams, fixture, replay_variance, truth
 from berteam_cli.games import Games
 from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, expected, held_ratings
+from berteam_cli.rating.counts import independent
 from berteam_cli.rating.elo import nats
 from berteam_cli.selector.base import TeamDistribution, unordered_teams
 from berteam_cli.workers import Workers
@@ -28,7 +29,9 @@ def rated(probability, elos, listed=True, draws=0, width=10.0):
     probability, listed = np.asarray(probability, dtype=float), np.broadcast_to(listed, count)
     draws = np.broadcast_to(draws, count)
     chosen = Chosen(zeros[:, np.newaxis], probability, listed, draws, float(probability[listed].sum()))
-    return Truth(chosen, np.asarray(elos, dtype=float), np.full(count, width), np.zeros((3, count, 1), dtype=int))
+    return Truth(
+        chosen, np.asarray(elos, dtype=float), np.full(count, width), independent(*np.zeros((3, count, 1), dtype=int))
+    )
 
 
 def test_all_teams_are_rated_if_there_are_games_for_them():
@@ -100,7 +103,8 @@ def test_the_interval_of_the_expected_elo_covers_it():
     for seed in range(300):
         chosen = choose_teams(found, drawn_by(found, seed), 1, 16)
         known = np.array([by_team[tuple(t)] for t in chosen.teams])
-        mean, width = Truth(chosen, known, np.zeros(len(chosen)), np.zeros((3, len(chosen), 1))).expected_elo()
+        none = independent(*np.zeros((3, len(chosen), 1), dtype=int))
+        mean, width = Truth(chosen, known, np.zeros(len(chosen)), none).expected_elo()
         covered += abs(mean - found.probability @ elos) <= width
     assert 0.90 <= covered / 300 <= 1
 
@@ -120,11 +124,11 @@ def test_the_fixed_teams_get_their_own_elos_back():
     chosen = Chosen(known.teams, np.full(28, 1 / 28), np.ones(28, dtype=bool), np.zeros(28, dtype=int), 1.0)
     found = truth(games, fixed_policies(range(7)), chosen, known, 2, np.random.default_rng(0))
     assert (np.abs(found.elos - known.elos) < found.half_widths).all()
-    assert (found.results.sum(axis=0) == 2).all()
+    assert (found.counts.results.sum(axis=0) == 2).all()
     assert np.corrcoef(found.elos, known.elos)[0, 1] > 0.98
     # Of held anchors, each team makes the points that are expected of it, but for the prior's.
     strengths, held = nats(found.elos)[:, np.newaxis], nats(known.elos)
-    made = (found.results[0] + 0.5 * found.results[1]).sum(axis=1)
+    made = (found.counts.results[0] + 0.5 * found.counts.results[1]).sum(axis=1)
     missing = made - (2 * expected(strengths, held)).sum(axis=1)
     np.testing.assert_allclose(missing, PRIOR_DRAWS * (expected(strengths[:, 0], 0.0) - 0.5), atol=1e-6)
 
@@ -139,10 +143,36 @@ def test_the_variance_of_repeated_games_is_known_from_one_evaluation():
     elos, widths = held_ratings(results[0] + 0.5 * results[1], np.full((repetitions, 12), 10), anchors)
     nobody = Chosen(np.zeros((repetitions, 1)), np.zeros(repetitions), np.zeros(0), np.zeros(0), 1.0)
     known = Reference(np.zeros((12, 1)), anchors, "by hand")
-    estimated = replay_variance(Truth(nobody, elos, widths, results), known)
+    estimated = replay_variance(Truth(nobody, elos, widths, independent(*results)), known)
     assert estimated.mean() == pytest.approx(elos.var(), rel=0.08)
-    once = Truth(nobody, elos[:1], widths[:1], np.ones((3, 1, 12), dtype=int) * [[[1]], [[0]], [[0]]])
+    once = Truth(nobody, elos[:1], widths[:1], independent(*np.ones((3, 1, 12), dtype=int) * [[[1]], [[0]], [[0]]]))
     assert np.isnan(replay_variance(once, known)).all()
+
+
+def test_games_played_again_make_nothing_surer():
+    """Two teams without chance have eight different games; forty make an Elo no surer, and repeating them no other."""
+    games, sure = mctf(2), range(6)
+    known = reference(games, 28)
+    teams = unordered_teams(7, 2)[[8, 9]]
+    assert np.isin(teams, sure).all()
+    chosen = Chosen(teams, np.full(2, 0.5), np.ones(2, dtype=bool), np.zeros(2, dtype=int), 1.0)
+    few, many = (truth(games, fixed_policies(range(7)), chosen, known, g, np.random.default_rng(0)) for g in (8, 40))
+    np.testing.assert_array_equal(many.record.sum(axis=0), 28 * 40)
+    certain = np.isin(known.teams, sure).all(axis=1)
+    assert 0 < certain.sum() < 28
+    twins = certain & (known.teams[:, 0] == known.teams[:, 1])  # who have four, as their orders are the same
+    for found, each in ((few, 8), (many, 40)):
+        np.testing.assert_array_equal(found.counts.settled, [certain, certain])
+        different = np.where(twins, 4, np.where(certain, 8, each))
+        np.testing.assert_array_equal(found.counts.different.sum(axis=(0, 3)), [different, different])
+        assert found.counts.repetition == pytest.approx(np.full(2, (each**2 / different).sum() / (28 * each)))
+    # Seven of the 28 opponents know chance; more games with them do make the Elos surer.
+    assert (many.half_widths > few.half_widths * 0.8).all()
+    # Only opponents that know chance let an Elo differ from one evaluation to the next.
+    alone = Reference(known.teams[certain], known.elos[certain], "without chance")
+    repeated = truth(games, fixed_policies(range(7)), chosen, alone, 9, np.random.default_rng(1))
+    np.testing.assert_array_equal(replay_variance(repeated, alone), 0)
+    assert (replay_variance(many, known) > 0).all()
 
 
 def test_teams_stand_on_both_sides_and_in_all_orders_equally_often():

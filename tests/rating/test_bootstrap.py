@@ -3,6 +3,7 @@ import pytest
 
 from berteam_cli.rating.bootstrap import fitted, held_samples, interval, rank_intervals, samples, superiority, times
 from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, expected, held_ratings, ratings
+from berteam_cli.rating.counts import Counts, independent
 from berteam_cli.rating.elo import nats, points
 
 
@@ -41,7 +42,7 @@ def test_intervals_against_anchors_cover_the_truth():
     anchors = rng.normal(1000, 150, 28)
     truth = rng.normal(0, 0.8, 300)
     counts = drawn(rng, expected(truth[:, np.newaxis], nats(anchors)), 0.3, 2)
-    low, high = interval(held_samples(*counts, anchors, rng, 400))
+    low, high = interval(held_samples(independent(*counts), anchors, rng, 400))
     assert 0.92 <= np.mean((low <= points(truth)) & (points(truth) <= high)) <= 0.98
 
 
@@ -72,15 +73,28 @@ def test_samples_lie_around_the_point_estimate():
     wins = rng.integers(0, 30, (5, 6))
     draws, losses = rng.integers(0, 30, (2, 5, 6))
     elos, _ = held_ratings(wins + draws / 2, (wins + draws + losses).astype(float), anchors)
-    found = held_samples(wins, draws, losses, anchors, rng, 2000)
+    found = held_samples(independent(wins, draws, losses), anchors, rng, 2000)
     assert np.abs(found.mean(axis=0) - elos).max() < 4 * found.std(axis=0).max() / np.sqrt(2000) + 1
 
 
 def test_hand_worked_variance():
     """Of games between equals ln(won / lost) scatters by 1/won + 1/lost, over however many anchors."""
     wins, losses = np.full((1, 100), 1), np.full((1, 100), 1)
-    found = nats(held_samples(wins, 0 * wins, losses, np.full(100, 1000.0), np.random.default_rng(5), 4000))
+    found = nats(
+        held_samples(independent(wins, 0 * wins, losses), np.full(100, 1000.0), np.random.default_rng(5), 4000)
+    )
     assert found.std() == pytest.approx(np.sqrt(1 / 100 + 1 / 100), rel=0.05)
+
+
+def test_copies_make_nothing_surer():
+    """As many different games as before, each played three times: the Elos scatter as if it were once."""
+    rng, anchors = np.random.default_rng(6), np.full(50, 1000.0)
+    won, lost = np.full((1, 50), 2), np.full((1, 50), 1)
+    once = independent(won, 0 * won, lost)
+    thrice = Counts(once.different, np.array([3]), once.settled)
+    told = [held_samples(games, anchors, rng, 4000).std() for games in (once, thrice)]
+    assert told[1] == pytest.approx(told[0], rel=0.05)
+    assert held_samples(independent(3 * won, 0 * won, 3 * lost), anchors, rng, 4000).std() < 0.65 * told[0]
 
 
 def test_a_perfect_record_has_an_interval():
@@ -102,7 +116,8 @@ def test_few_games_a_pair_scatter_as_many_tournaments_do():
 
 def test_the_same_generator_gives_the_same_samples():
     counts = np.arange(12).reshape(3, 4)
-    one, two = (held_samples(counts, counts, counts[::-1], np.zeros(4), np.random.default_rng(6), 50) for _ in range(2))
+    games = independent(counts, counts, counts[::-1])
+    one, two = (held_samples(games, np.zeros(4), np.random.default_rng(6), 50) for _ in range(2))
     assert np.array_equal(one, two)
 
 
