@@ -18,8 +18,8 @@ from berteam_cli.errors import InputError
 from berteam_cli.evaluation.comparison import Comparison, Figures, Played, compared, counted, planned
 from berteam_cli.evaluation.contenders import Contender, algorithms, contenders
 from berteam_cli.evaluation.playing import play_all
-from berteam_cli.evaluation.sheet import forget
 from berteam_cli.evaluation.reference import reference
+from berteam_cli.evaluation.sheet import forget
 from berteam_cli.folder import logging_to, new_folder
 from berteam_cli.games import Games
 from berteam_cli.outcomes import Ints

@@ -22,10 +22,10 @@ from berteam_cli.evaluation.equilibria import exploitability, total_variation
 from berteam_cli.evaluation.figures import Replayed, figures, replayed
 from berteam_cli.evaluation.likeness import likeness
 from berteam_cli.evaluation.manners import Manners, composition, member_rows, team_rows
-from berteam_cli.evaluation.sheet import forget
 from berteam_cli.evaluation.points import Points, point_rows, reference_points, why_not
 from berteam_cli.evaluation.reference import reference
 from berteam_cli.evaluation.regression import FEWEST, regression
+from berteam_cli.evaluation.sheet import forget
 from berteam_cli.evaluation.strength import Match, Strength
 from berteam_cli.evaluation.truth import choose_teams
 from berteam_cli.folder import Manifest, logging_to

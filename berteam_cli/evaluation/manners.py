@@ -45,8 +45,8 @@ class Manners:
 
         A game and its copies are drawn together.
         """
-        low, high = zip(*(interval(resampled(*team, rng)) for team in zip(self.ratios, self.copies, strict=True)))
-        return np.array(low), np.array(high)
+        drawn = [resampled(*team, rng) for team in zip(self.ratios, self.copies, strict=True)]
+        return interval(np.stack(drawn, axis=1))
 
 
 def resampled(ratios: Floats, copies: Ints, rng: Generator) -> Floats:
