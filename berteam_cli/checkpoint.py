@@ -10,6 +10,7 @@ import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from safetensors import SafetensorError
@@ -22,7 +23,7 @@ from berteam_cli.training import Parts, Run
 
 log = logging.getLogger("berteam")
 
-SCHEMA = 4  # raised when a file of an older version could be misread
+SCHEMA = 5  # raised when a file of an older version could be misread
 KEPT = 2
 
 
@@ -45,13 +46,40 @@ def save(folder: Path, saved: Saved, parts: Parts) -> None:
     """Saves a run under ``folder``/checkpoint; the last two are kept.
 
     The files are written under another name first: whoever interrupts this leaves the older checkpoints as they were.
+    Those of later epochs, which a run leaves that had to go back before one, are removed.
+
+    Raises:
+        OSError: there is no room.
     """
-    run = saved.run
     place = folder / "checkpoint"
-    final, part = place / f"epoch_{run.epoch:08d}", place / "part"
+    final, part = place / f"epoch_{saved.run.epoch:08d}", place / "part"
     shutil.rmtree(part, ignore_errors=True)
     part.mkdir(parents=True)
-    save_file(tensors_of(run, parts), part / "tensors.safetensors")
+    try:
+        write(part, saved, parts)
+    except BaseException:
+        shutil.rmtree(part, ignore_errors=True)
+        raise
+    shutil.rmtree(final, ignore_errors=True)
+    os.replace(part, final)
+    sync(place)
+    whole = sorted(place.glob("epoch_*"))
+    here = whole.index(final)
+    for other in (*whole[: max(0, here + 1 - KEPT)], *whole[here + 1 :]):
+        shutil.rmtree(other)
+
+
+def write(part: Path, saved: Saved, parts: Parts) -> None:
+    """Writes the files of a checkpoint into folder ``part``; they are on the disk then.
+
+    Raises:
+        OSError: there is no room.
+    """
+    run = saved.run
+    try:
+        save_file(tensors_of(run, parts), part / "tensors.safetensors")
+    except SafetensorError as error:  # as the library calls a full disk
+        raise OSError(f"{part} cannot be written: {error}") from error
     said = {
         "schema": SCHEMA,
         "epoch": run.epoch,
@@ -61,15 +89,12 @@ def save(folder: Path, saved: Saved, parts: Parts) -> None:
         "table_sizes": saved.table_sizes,
         "sha256": digest(part / "tensors.safetensors"),
     }
+    said["checksum"] = checksum(said)
     (part / "state.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     for file in part.iterdir():
         with file.open("rb") as opened:
             os.fsync(opened.fileno())
-    shutil.rmtree(final, ignore_errors=True)
-    os.replace(part, final)
-    sync(place)
-    for old in sorted(place.glob("epoch_*"))[:-KEPT]:
-        shutil.rmtree(old)
+    sync(part)
 
 
 def sync(folder: Path) -> None:
@@ -80,6 +105,11 @@ def sync(folder: Path) -> None:
             os.fsync(opened)
         finally:
             os.close(opened)
+
+
+def any_in(folder: Path) -> bool:
+    """Returns whether there is a checkpoint under ``folder``, whole or not."""
+    return any((folder / "checkpoint").glob("epoch_*"))
 
 
 def load(folder: Path, parts: Parts) -> Saved:
@@ -122,7 +152,7 @@ def read(place: Path, parts: Parts) -> Saved:
     said = json.loads((place / "state.json").read_text(encoding="utf-8"))
     if said["schema"] != SCHEMA:
         raise ValueError(f"its schema is {said['schema']}, this version reads {SCHEMA}")
-    if digest(place / "tensors.safetensors") != said["sha256"]:
+    if checksum(said) != said["checksum"] or digest(place / "tensors.safetensors") != said["sha256"]:
         raise ValueError("its checksum is wrong")
     # In memory of their own: by where a tensor lies torch chooses its kernels, and so the last bits of what comes out.
     tensors = load_file(place / "tensors.safetensors")
@@ -150,6 +180,12 @@ def alone(tensor: torch.Tensor) -> torch.Tensor:
     """Returns ``tensor``, or a copy where it is part of a larger one, whose memory another part may share."""
     whole = tensor.untyped_storage().nbytes() == tensor.nbytes
     return tensor if whole else tensor.clone()
+
+
+def checksum(said: dict[str, Any]) -> str:
+    """Returns the SHA-256 of what a state says, itself left out."""
+    rest = {key: value for key, value in said.items() if key != "checksum"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()
 
 
 def digest(path: Path) -> str:

@@ -9,6 +9,7 @@ import argparse
 import importlib
 import itertools
 import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -56,6 +57,7 @@ def main() -> None:
     if words[0] == "--version":
         print(__version__)
         sys.exit(0)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's way to say Ctrl-C
     try:
         run(words[0], words[1:])
     except (InputError, RunError) as error:
@@ -75,9 +77,24 @@ def run(word: str, words: list[str]) -> None:
     """
     if word not in WORDS:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
-    commands = {"train": composed, "tournament": composed}
+    commands = {"train": training, "tournament": composed}
     commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing}
     commands.get(word, about)(word, words)
+
+
+def training(word: str, words: list[str]) -> None:
+    """Trains; with resume=RUN among the words as `berteam resume` does.
+
+    Raises:
+        InputError: a run is to go on in a sweep, or two at once.
+    """
+    going_on = [x.partition("=")[2] for x in words if x.startswith("resume=")]
+    if not going_on:
+        composed(word, words)
+        return
+    if len(going_on) > 1 or {"-m", "--multirun"} & set(words):
+        raise InputError("resume=RUN goes on with one run; berteam sweep --resume DIR goes on with a sweep.")
+    resume("resume", [*going_on, *(x for x in words if not x.startswith("resume="))])
 
 
 def composed(word: str, words: list[str]) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.resources
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -224,7 +226,9 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
         group: such as "selector".
         searched: overrides that add folders to search.
     """
-    if group.split("/", maxsplit=1)[0] == "schema":
+    first = re.split("[/@]", group, maxsplit=1)[0]
+    # Asking Hydra for the choices of a group takes a tenth of a second, which most keys need not cost.
+    if first == "schema" or not (searched or first in all_groups()):
         return []
     loader = GlobalHydra.instance().config_loader()
     return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
@@ -232,7 +236,13 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
 
 def groups() -> list[str]:
     """Returns the config groups a user chooses from."""
-    return [x for x in sorted(GlobalHydra.instance().config_loader().list_groups("")) if x not in HIDDEN]
+    return [x for x in all_groups() if x not in HIDDEN]
+
+
+@functools.cache
+def all_groups() -> list[str]:
+    """Returns the config groups of the package and of Hydra."""
+    return sorted(GlobalHydra.instance().config_loader().list_groups(""))
 
 
 def help_text(command: str) -> str:

@@ -10,7 +10,7 @@ import shutil
 import sys
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from itertools import product
@@ -32,34 +32,32 @@ def new_folder(command: str) -> Path:
 
 
 def claim(folder: Path, on_exists: str) -> None:
-    """Makes ``folder`` ready for a new run.
+    """Makes ``folder``, which this process holds, ready for a new run.
 
     With ``on_exists`` "overwrite" the files of an earlier run are removed, and nothing else that lies there.
 
     Raises:
         InputError: it holds a run already, or it cannot be written.
     """
-    if (folder / MANIFEST).exists():
-        if on_exists != "overwrite":
-            raise InputError(
-                f"out={folder} holds a run already; choose another folder, "
-                f"or on_exists=overwrite to replace it, or on_exists=resume to go on with it."
-            )
-        for name in (*(f"{table}.csv" for table in COLUMNS), MANIFEST, CONFIG, LOG, ERROR):
-            for place in (folder, folder / EVALUATION):
-                (place / name).unlink(missing_ok=True)
-        for sheet, ending in product(SHEETS, SHEET_ENDINGS):
-            (folder / EVALUATION / f"{sheet}{ending}").unlink(missing_ok=True)
+    if not (folder / MANIFEST).exists():
+        return
+    if on_exists != "overwrite":
+        raise InputError(
+            f"out={folder} holds a run already; choose another folder, "
+            f"or on_exists=overwrite to replace it, or on_exists=resume to go on with it."
+        )
+    try:
+        os.truncate(folder / LOG, 0)  # it is what the folder is held by
         for name in ("checkpoint", "tensorboard"):
             shutil.rmtree(folder / name, ignore_errors=True)
-    made = missing(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / LOG).touch()
+        for sheet, ending in product(SHEETS, SHEET_ENDINGS):
+            (folder / EVALUATION / f"{sheet}{ending}").unlink(missing_ok=True)
+        (folder / EVALUATION / LOG).unlink(missing_ok=True)
+        # The manifest goes last: until then the folder is still that of a run, and can be overwritten again.
+        for name in (*(f"{table}.csv" for table in COLUMNS), CONFIG, ERROR, MANIFEST):
+            for place in (folder / EVALUATION, folder):
+                (place / name).unlink(missing_ok=True)
     except OSError as error:
-        for path in reversed(made):
-            if path.is_dir():
-                path.rmdir()
         raise InputError(f"out={folder} cannot be written: {error.strerror or error}.") from error
 
 
@@ -79,6 +77,17 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
             part.unlink(missing_ok=True)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a small file; there is never half of it under ``path``, and nothing else stays of what failed."""
+    part = path.with_suffix(".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def missing(folder: Path) -> list[Path]:
@@ -121,9 +130,12 @@ class Manifest:
     def add(self, **facts: Any) -> None:
         """Adds to what is known, and writes it; there is never half of the file."""
         self.facts |= facts
-        part = (self.folder / MANIFEST).with_suffix(".part")
-        part.write_text(json.dumps(self.facts, indent=1) + "\n", encoding="utf-8")
-        os.replace(part, self.folder / MANIFEST)
+        write_text(self.folder / MANIFEST, json.dumps(self.facts, indent=1) + "\n")
+
+    def note(self, **facts: Any) -> None:
+        """Adds to what is known, if it can be written: something else has gone wrong, and is told instead."""
+        with suppress(OSError):
+            self.add(**facts)
 
     @contextmanager
     def until_the_end(self, resumable: bool = True, again: str = "") -> Iterator[None]:
@@ -149,15 +161,17 @@ class Manifest:
         try:
             yield
         except KeyboardInterrupt:
-            self.add(status="interrupted", ended=now())
+            self.note(status="interrupted", ended=now())
             log.info("Interrupted. %s", go_on())
             raise
         except Exception as error:
-            (self.folder / ERROR).write_text(traceback.format_exc(), encoding="utf-8")
-            self.add(status="failed", ended=now())
-            raise RunError(
-                f"The run failed: {type(error).__name__}: {error} (traceback in {self.folder / ERROR}). {go_on()}"
-            ) from error
+            where = f" (traceback in {self.folder / ERROR})"
+            try:
+                write_text(self.folder / ERROR, traceback.format_exc())
+            except OSError:  # the disk is full, perhaps
+                where = ""
+            self.note(status="failed", ended=now())
+            raise RunError(f"The run failed: {type(error).__name__}: {error}{where}. {go_on()}") from error
         self.add(status="done", ended=now())
 
 
@@ -196,10 +210,17 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     return manifest
 
 
+class Lines(logging.FileHandler):
+    """The log; a line for which there is no room on the disk is left out, as what it is about goes on or is told."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Does nothing."""
+
+
 @contextmanager
 def logging_to(folder: Path) -> Iterator[None]:
     """Sends the log to the terminal and, with times, to the folder's log.txt."""
-    file = logging.FileHandler(folder / LOG, encoding="utf-8")
+    file = Lines(folder / LOG, encoding="utf-8")
     file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     terminal = logging.StreamHandler(sys.stdout)
     terminal.setFormatter(logging.Formatter("%(message)s"))

@@ -8,6 +8,7 @@ from berteam_cli import build, checkpoint
 from berteam_cli.config import checked
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.folder import read_manifest
+from berteam_cli.holding import in_use
 from berteam_cli.stored import plain_config, stored_config
 from berteam_cli.training import Parts, Run
 
@@ -42,5 +43,5 @@ def how_far(folder: Path, epoch: int) -> str:
     status = read_manifest(folder)["status"]
     if status == "done":
         return f"after epoch {epoch}"
-    said = "still going or broken off" if status == "running" else status
+    said = ("still going" if in_use(folder) else "broken off") if status == "running" else status
     return f"after epoch {epoch} of {plain_config(folder).epochs}, {said}"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from berteam_cli.config import SCHEMAS
 from berteam_cli.config_commands import TrainConfig
 from berteam_cli.config_groups import IslandConfig
 from berteam_cli.errors import InputError
-from berteam_cli.folder import CONFIG, Manifest, claim
+from berteam_cli.folder import CONFIG, MANIFEST, Manifest, claim, write_text
+from berteam_cli.holding import held
 
 MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation", "logger")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
@@ -26,9 +28,7 @@ PLACE = ("out", "on_exists")
 
 def write_config(folder: Path, text: str) -> None:
     """Writes the config ``text``; there is never half of it."""
-    part = (folder / CONFIG).with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, folder / CONFIG)
+    write_text(folder / CONFIG, text)
 
 
 def plain_config(folder: Path) -> DictConfig:
@@ -103,8 +103,9 @@ def check_same(folder: Path, text: str) -> None:
             )
 
 
-def begun(folder: Path, on_exists: str, text: str, what: str, facts: dict[str, Any]) -> Manifest:
-    """Returns the manifest of a command's work that begins, or goes on, in ``folder``.
+@contextmanager
+def begun(folder: Path, on_exists: str, text: str, what: str, facts: dict[str, Any]) -> Iterator[Manifest]:
+    """Gives the manifest of a command's work that begins, or goes on, in ``folder``, which it holds.
 
     Args:
         folder: where its tables go.
@@ -116,14 +117,16 @@ def begun(folder: Path, on_exists: str, text: str, what: str, facts: dict[str, A
     Raises:
         InputError: the folder is not free, or holds work of another config, or such as is done.
     """
-    if on_exists == "resume" and (folder / CONFIG).exists():
-        check_same(folder, text)
-        if Manifest.of(folder).facts["status"] == "done":
-            raise InputError(f"out={folder} holds this {what} already, and it is done.")
-        return Manifest.resumed(folder)
-    claim(folder, on_exists)
-    write_config(folder, text)
-    return Manifest.begun(folder, **facts)
+    with held(folder):
+        if on_exists == "resume" and (folder / MANIFEST).exists():
+            check_same(folder, text)
+            if Manifest.of(folder).facts["status"] == "done":
+                raise InputError(f"out={folder} holds this {what} already, and it is done.")
+            yield Manifest.resumed(folder)
+        else:
+            claim(folder, on_exists)
+            write_config(folder, text)
+            yield Manifest.begun(folder, **facts)
 
 
 def flat(config: Any, prefix: str = "") -> dict[str, Any]:

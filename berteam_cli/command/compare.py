@@ -55,10 +55,11 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
         raise InputError(f"out={folder} is one of the runs; choose another folder.")
     broken = [x.broken for x in runs if x.broken]
     facts = {"seed": config.seed, "algorithms": names, "runs": len(runs), "broken_off": broken}
-    manifest = begun(folder, config.on_exists, text, "comparison", facts)
+    again = f"Go on with the same command, out={folder} on_exists=resume."
     with (
+        begun(folder, config.on_exists, text, "comparison", facts) as manifest,
         logging_to(folder),
-        manifest.until_the_end(again=f"Go on with the same command, out={folder} on_exists=resume."),
+        manifest.until_the_end(again=again),
     ):
         log.info("%s", folder)
         for sentence in broken:

@@ -14,7 +14,6 @@ from rich.console import Console
 
 from berteam_cli.command.inspect import printed
 from berteam_cli.config_commands import EvaluateConfig
-from berteam_cli.errors import InputError
 from berteam_cli.evaluation.calibration import deciles
 from berteam_cli.evaluation.conditioning import conditioning_rows, encounters
 from berteam_cli.evaluation.ending import elo_rows
@@ -29,6 +28,7 @@ from berteam_cli.evaluation.sheet import forget
 from berteam_cli.evaluation.strength import Match, Strength
 from berteam_cli.evaluation.truth import choose_teams
 from berteam_cli.folder import Manifest, logging_to
+from berteam_cli.holding import held
 from berteam_cli.population import names, policies
 from berteam_cli.reading import how_far, last_state
 from berteam_cli.records import COLUMNS, EVALUATION, SHEETS, team_name, team_names, write_table
@@ -70,12 +70,8 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
     place = folder / EVALUATION
     look = Look(config, parts, run, place, Console(width=None if Console().is_terminal else 120))
     look.say(f"{folder} {far}")
-    try:
-        place.mkdir(exist_ok=True)
+    with held(place), logging_to(place):
         write_config(place, text)
-    except OSError as error:
-        raise InputError(f"{place} cannot be written: {error.strerror or error}.") from error
-    with logging_to(place):
         manifest = Manifest.begun(place, run=str(folder), epoch=run.epoch, evaluated=far, seed=config.seed)
         with manifest.until_the_end(again="The same command goes on from there."):
             tables, facts = look.all()

@@ -16,6 +16,7 @@ from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder
+from berteam_cli.holding import held
 from berteam_cli.logger.base import Once
 from berteam_cli.logger.opening import check_logger, figures_of, logger
 from berteam_cli.memory import spoken, state_bytes
@@ -42,13 +43,21 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
         RunError: the run could not go on.
         KeyboardInterrupt: it was interrupted; its state is saved.
     """
-    started = time.monotonic()
     folder = folder or new_folder("train")
     check_logger(config.logger)
     parts = build.parts(config, stored=goes_on(config, folder))
+    with held(folder):
+        expected = held_run(config, text, folder, parts)
+    show(folder, 10)
+    return expected
+
+
+def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> float:
+    """Trains in a ``folder`` that this process holds; see ``train``."""
+    started = time.monotonic()
     saved = resumed(config, text, folder, parts)
     if saved is None:
-        claim(folder, config.on_exists)
+        claim(folder, "overwrite" if goes_on(config, folder) else config.on_exists)
     write_config(folder, text)
     with logging_to(folder):
         log.info("%s", folder)
@@ -67,12 +76,11 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
                     config.evaluation, folder, run, recorder, manifest, lambda: before + time.monotonic() - started
                 )
                 also(run.epoch, {"elo/expected": expected})
-    show(folder, 10)
     return expected
 
 
 def resumed(config: TrainConfig, text: str, folder: Path, parts: Parts) -> Saved | None:
-    """Returns the checkpoint to go on from, or None where the run begins anew.
+    """Returns the checkpoint to go on from, or None where the run begins anew, as one must that ended before its first.
 
     Raises:
         InputError: the folder's run was made with other settings, or is further than the config wants it.
@@ -82,6 +90,8 @@ def resumed(config: TrainConfig, text: str, folder: Path, parts: Parts) -> Saved
         return None
     checkpoint.check_schema(folder)
     check_same(folder, text)
+    if not checkpoint.any_in(folder):
+        return None
     saved = checkpoint.load(folder, parts)
     done = saved.run.epoch
     if done > config.epochs:
@@ -114,10 +124,11 @@ def trained(
         state = recorder.epoch(run, report)
         also(run.epoch, figures_of(run, report, parts, state))
         pace.tell(run.epoch, config.games_per_epoch)
-        if stop.asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
+        asked = stop.asked  # later than this it ends after the next epoch
+        if asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
             keep()
         stop.in_epoch = False
-        if stop.asked:
+        if asked:
             tables.close()
             raise KeyboardInterrupt
     recorder.last(run)

@@ -271,7 +271,7 @@ def test_a_run_that_was_broken_off_is_looked_at_as_far_as_it_got(berteam, tmp_pa
     about = json.loads(manifest.read_text())
     config = tmp_path / "run" / "config.yaml"
     config.write_text(config.read_text().replace("epochs: 4", "epochs: 200"))
-    for status, word in (("interrupted", "interrupted"), ("running", "still going or broken off")):
+    for status, word in (("interrupted", "interrupted"), ("running", "broken off")):
         manifest.write_text(json.dumps(about | {"status": status}))
         said = berteam("evaluate", "run").stdout
         assert said.startswith(f"run after epoch 4 of 200, {word}\n")
