@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: help setup demo test lint bench check picture reference clean
+.PHONY: help setup demo test lint faults bench check picture reference clean
 
 help: ## what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -26,6 +26,9 @@ test: setup ## all tests
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/python -m pytest --numprocesses 2
+
+faults: setup ## kills, full disks, damaged checkpoints, wrong command lines: what a run survives, in some twenty minutes
+	$(BIN)/python -m tests.faults
 
 bench: setup ## speed: figures, targets and ratios
 	$(BIN)/python -m tests.bench

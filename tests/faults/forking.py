@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,6 +71,8 @@ def started(place: Path, *words: str, prepare: Prepare = nothing) -> Child:
         code = stopped.code if isinstance(stopped.code, int) else 98
     except KeyboardInterrupt:  # before the command was under way
         code = 130
+    except BaseException:
+        traceback.print_exc()
     finally:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -77,8 +77,12 @@ def wrong_now(place: Path) -> str:
 
 
 def wrong_at_last(place: Path, known: Whole) -> str:
-    """Goes on with the run to its end; returns what differs from the whole one: nothing, if it came through."""
-    code, said = finished(place, *GO_ON)
+    """Goes on with the run to its end; returns what differs from the whole one: nothing, if it came through.
+
+    With the command that a user is told, where there is a checkpoint; else with the one that began.
+    """
+    there = any((place / "run" / "checkpoint").glob("epoch_*"))
+    code, said = finished(place, *(("resume", "run") if there else GO_ON))
     if code:
         return f"exit {code}: {said}"
     found = tables(place / "run")
@@ -87,9 +91,7 @@ def wrong_at_last(place: Path, known: Whole) -> str:
         return f"other bytes in {', '.join(differ)}"
     for name in TIMED:
         pd.read_csv(place / "run" / name)
-    left = [path.name for path in (place / "run").rglob("*.part")] + [
-        path.name for path in (place / "run" / "checkpoint").iterdir() if path.name == "part"
-    ]
+    left = [path.name for path in (place / "run").rglob("*part")]
     return f"left behind: {left}" if left else ""
 
 

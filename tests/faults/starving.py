@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import resource
 import shutil
@@ -16,7 +17,7 @@ import numpy as np
 from tests.faults.forking import finished, started
 from tests.faults.job import GO_ON, WORDS, Whole, fresh, one_sentence, tables, wrong_at_last, wrong_now
 
-NOBODY = 65534  # the user who owns nothing
+CAPABILITIES = ctypes.c_uint32 * 6  # effective, permitted, inheritable; twice
 
 
 def refused(code: int, said: str, allowed: tuple[int, ...] = (2, 3)) -> str:
@@ -65,12 +66,13 @@ def mounted(place: Path, options: str) -> bool:
     return shutil.which("mount") is not None and subprocess.run(mount, capture_output=True, check=False).returncode == 0
 
 
-def somebody_else() -> None:
-    """Makes this process one of a user who may not write here, if it is the administrator's."""
+def no_privilege() -> None:
+    """Lets this process, if it is the administrator's, write no files that it may not write by their modes (Linux)."""
     if os.geteuid() == 0:
-        os.setgroups([])
-        os.setgid(NOBODY)
-        os.setuid(NOBODY)
+        libc, header, sets = ctypes.CDLL(None, use_errno=True), (ctypes.c_uint32 * 2)(0x20080522, 0), CAPABILITIES()
+        assert libc.capget(header, sets) == 0
+        sets[0] &= ~(1 << 1 | 1 << 2)  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH of the effective ones
+        assert libc.capset(header, sets) == 0
 
 
 def read_only(place: Path, known: Whole) -> Iterator[tuple[str, str]]:
@@ -84,7 +86,7 @@ def read_only(place: Path, known: Whole) -> Iterator[tuple[str, str]]:
             child.ended()
         before = {path: path.stat().st_mtime_ns for path in place.rglob("*") if path.name != "said.txt"}
         locked(place, writable=False)
-        code, said = finished(place, *words, prepare=somebody_else)
+        code, said = finished(place, *words, prepare=no_privilege)
         locked(place, writable=True)
         after = {path: path.stat().st_mtime_ns for path in place.rglob("*") if path.name != "said.txt"}
         wrong = refused(code, said) or ("" if after == before else "something was written")
@@ -103,18 +105,24 @@ def locked(place: Path, *, writable: bool) -> None:
 def little_memory(place: Path, known: Whole, count: int, seed: int) -> Iterator[tuple[str, str]]:
     """Runs that may take so much memory and no more: told before the start, or wherever it is not enough."""
     fresh(place)
-    code, said = finished(place, *WORDS, prepare=lambda: limit(resource.RLIMIT_AS, 2**30))
-    told = "" if code == 2 and "of memory" in said and not (place / "run").exists() else f"exit {code}: {said}"
-    yield "a GiB of memory", told or one_sentence(said) or wrong_at_last(place, known)
+    words = (*WORDS, "population.islands.dqn64.learner.buffer_size=1000000")
+    code, said = finished(place, *words, prepare=lambda: limit(resource.RLIMIT_AS, virtual_bytes(os.getpid()) + 2**28))
+    told = "" if code == 2 and "learner.buffer_size must be <= " in said else f"exit {code}: {said}"
+    left = "a folder was made" if (place / "run").exists() else ""
+    yield "more members than memory, told before the start", told or one_sentence(said) or left
     for moment in np.random.default_rng(seed).uniform(0, known.seconds, count):
         fresh(place)
         child = started(place, *WORDS)
         if child.ended_within(moment) is None:
-            pages = int(Path(f"/proc/{child.pid}/statm").read_text().split()[0])
-            now = pages * os.sysconf("SC_PAGE_SIZE")
+            now = virtual_bytes(child.pid)
             resource.prlimit(child.pid, resource.RLIMIT_AS, (now, now))
             child.ended()  # however it does
         yield f"no more memory after {moment:.2f} s", wrong_now(place) or wrong_at_last(place, known)
+
+
+def virtual_bytes(pid: int) -> int:
+    """Returns the bytes of address space that a process has."""
+    return int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def clock_set_back(place: Path, known: Whole) -> Iterator[tuple[str, str]]:
