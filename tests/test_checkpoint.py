@@ -47,7 +47,7 @@ def test_the_last_two_are_kept(runs, tmp_path):
     assert sorted(p.name for p in (tmp_path / "checkpoint").iterdir()) == ["epoch_00000002", "epoch_00000003"]
 
 
-@pytest.mark.parametrize("damage", ["flip", "cut", "no state", "half a state", "other schema"])
+@pytest.mark.parametrize("damage", ["flip", "cut", "no state", "half a state", "other", "number"])
 def test_a_damaged_checkpoint_is_passed_over(damage, runs, parts, tmp_path):
     newest = tmp_path / "checkpoint" / "epoch_00000003"
     state, data = newest / "state.json", newest / "tensors.safetensors"
@@ -61,9 +61,33 @@ def test_a_damaged_checkpoint_is_passed_over(damage, runs, parts, tmp_path):
         state.unlink()
     elif damage == "half a state":
         state.write_text(state.read_text()[:40])
+    elif damage == "number":  # still good JSON, of another epoch
+        state.write_text(state.read_text().replace('"played": 48', '"played": 40'))
     else:
         state.write_text(json.dumps(json.loads(state.read_text()) | {"schema": 99}))
     assert checkpoint.load(tmp_path, parts).run.epoch == 2
+
+
+def test_a_run_that_went_back_leaves_no_later_checkpoint(runs, parts, tmp_path):
+    """Else a damaged one would be taken for the newest for ever, and be one of the two that are kept."""
+    newest = tmp_path / "checkpoint" / "epoch_00000003" / "tensors.safetensors"
+    newest.write_bytes(newest.read_bytes()[:-1])
+    back = checkpoint.load(tmp_path, parts)
+    assert back.run.epoch == 2
+    checkpoint.save(tmp_path, back, parts)
+    assert [p.name for p in (tmp_path / "checkpoint").iterdir()] == ["epoch_00000002"]
+    checkpoint.save(tmp_path, Saved(runs[3], {}, 0.0), parts)
+    assert checkpoint.load(tmp_path, parts).run.epoch == 3
+
+
+def test_what_cannot_be_written_leaves_the_others(runs, parts, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(checkpoint, "save_file", full)
+    with pytest.raises(OSError, match="No space"):
+        checkpoint.save(tmp_path, Saved(runs[1], {}, 0.0), parts)
+    assert sorted(p.name for p in (tmp_path / "checkpoint").iterdir()) == ["epoch_00000002", "epoch_00000003"]
 
 
 def test_an_unfinished_checkpoint_is_not_one(runs, parts, tmp_path):

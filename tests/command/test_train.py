@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -269,6 +270,31 @@ def test_resume_refuses_what_would_not_be_the_same_run(berteam, tmp_path):
     assert "config.yaml cannot be read" in berteam("resume", "run", code=2).stderr
     (tmp_path / "run" / "manifest.json").write_text("[1]")
     assert "is no folder of a run" in berteam("inspect", "run", code=2).stderr
+
+
+def test_train_goes_on_with_a_run_that_it_is_told(berteam, tmp_path):
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform"]
+    berteam(*words, "epochs=4", "out=whole")
+    berteam(*words, "epochs=2", "out=run")
+    berteam("train", "resume=run", "epochs=4")
+    for name in UNTIMED:
+        assert (tmp_path / "run" / f"{name}.csv").read_bytes() == (tmp_path / "whole" / f"{name}.csv").read_bytes()
+    assert "seed cannot be changed" in berteam("train", "resume=run", "seed=3", code=2).stderr
+    assert "goes on with one run" in berteam("train", "-m", "resume=run", "epochs=5", code=2).stderr
+    assert "nowhere is no folder of a run" in berteam("train", "resume=nowhere", code=2).stderr
+
+
+def test_a_run_without_a_checkpoint_begins_again(berteam, tmp_path):
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "epochs=2", "out=run"]
+    berteam(*words)
+    whole = {name: (tmp_path / "run" / f"{name}.csv").read_bytes() for name in UNTIMED}
+    shutil.rmtree(tmp_path / "run" / "checkpoint")
+    (tmp_path / "run" / "elo.csv").unlink()
+    berteam("resume", "run")
+    assert {name: (tmp_path / "run" / f"{name}.csv").read_bytes() for name in UNTIMED} == whole
+    for state in (tmp_path / "run" / "checkpoint").glob("*/state.json"):
+        state.write_text("{}")
+    assert "is damaged" in berteam(*words, "on_exists=resume", code=3).stderr  # which is not for us to throw away
 
 
 def test_a_run_goes_on_where_updates_explode(berteam, tmp_path):
