@@ -9,9 +9,12 @@ those thirty on at each call.
 """
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from numba import njit
+
+if TYPE_CHECKING:
+    from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -19,7 +22,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 class Compiler(Protocol):
     """A decorator whose compiled function is called like the plain one."""
 
-    def __call__(self, function: Function, /) -> Function:
+    def __call__(self, function: Function, /) -> "Dispatcher[Function]":
         """Returns the function, to be compiled when it is first called."""
 
 

@@ -266,7 +266,8 @@ class MctfEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             return render.frame(self._lanes.state, 0, self.rules)
         if self.render_mode == "ansi":
             return render.text(self._lanes.state, 0, self.rules)
-        self._window.show(self._lanes.state, 0)
+        if self._window is not None:  # it is there in the one mode that is left, "human"
+            self._window.show(self._lanes.state, 0)
         return None
 
     def close(self) -> None:
