@@ -46,8 +46,13 @@ row are the same team's; returns outcomes with the members as side 0 in every re
 class Optimizer(Protocol):
     """Makes a population better from its games; keeps settings only."""
 
-    islands: tuple[Island, ...]
-    learns: bool  # whether ``train`` wants to know what the players saw
+    @property
+    def islands(self) -> tuple[Island, ...]:
+        """Of the population."""
+
+    @property
+    def learns(self) -> bool:
+        """Whether ``train`` wants to know what the players saw."""
 
     def rate(self, population: Population, outcomes: Outcomes) -> Population:
         """Returns the population with the fitness that ``outcomes`` give."""
