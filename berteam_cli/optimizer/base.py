@@ -9,6 +9,7 @@ from typing import Protocol
 from numpy.random import Generator
 
 from berteam_cli.learner.base import Learning
+from berteam_cli.optimizer.fitness import FitnessRule
 from berteam_cli.outcomes import Experience, Ints, Outcomes
 from berteam_cli.population import Island, Population
 
@@ -49,6 +50,10 @@ class Optimizer(Protocol):
     @property
     def islands(self) -> tuple[Island, ...]:
         """Of the population."""
+
+    @property
+    def fitness(self) -> FitnessRule:
+        """How games become fitness."""
 
     @property
     def learns(self) -> bool:
