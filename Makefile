@@ -3,10 +3,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: help setup demo test lint faults bench check picture reference clean
+.PHONY: help setup demo test lint coverage hooks faults bench check picture reference clean
 
 help: ## what can be made
-	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
+	@grep -hE '^[a-zA-Z0-9_-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 setup: $(READY) ## a virtual environment with the package and its tests' needs, and the kernels compiled
 
@@ -22,10 +22,19 @@ $(READY): pyproject.toml constraints.txt
 demo: setup ## the main job, small: train, then look at what came of it
 	$(BIN)/berteam train experiment=quickstart selector=mcaa optimizer=mapelites
 
-test: setup ## all tests
+test: lint ## style, types and all tests
+	$(BIN)/python -m pytest --numprocesses 2
+
+lint: setup ## style (ruff) and types (mypy)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/python -m pytest --numprocesses 2
+	$(BIN)/mypy
+
+coverage: setup ## all tests, and which lines of the packages they run
+	$(BIN)/python -m pytest --numprocesses 2 --cov --cov-report term
+
+hooks: setup ## style and types checked at each commit, by pre-commit
+	$(BIN)/pre-commit install
 
 faults: setup ## kills, full disks, damaged checkpoints, wrong command lines: what a run survives, in some twenty minutes
 	$(BIN)/python -m tests.faults
@@ -46,5 +55,5 @@ reference: setup ## the Elos of the fixed teams that the package ships
 	cp outputs/reference/elo.csv berteam_cli/rating/$$($(BIN)/python -c 'import json; print(json.load(open("outputs/reference/manifest.json"))["reference"])')
 
 clean: ## removes the environment and what tests leave; run folders stay
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .hypothesis .ruff_cache
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .hypothesis .ruff_cache .mypy_cache .coverage*
 	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -86,7 +86,7 @@ def joined(tables: list[Policies]) -> Policies:
     widest = max(table.weights.shape[1] for table in tables)
     weights = [np.pad(t.weights, ((0, 0), (0, widest - t.weights.shape[1]))) for t in tables]
     columns = [np.concatenate(column) for column in zip(*(t[:-1] for t in tables), strict=True)]
-    return Policies(*columns, weights=np.concatenate(weights))
+    return Policies._make((*columns, np.concatenate(weights)))
 
 
 def noisy(policies: Policies, chance: float) -> Policies:

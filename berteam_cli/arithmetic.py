@@ -58,7 +58,22 @@ def tile(rows: int, lanes: int) -> Callable[..., None]:
         return context.get_dummy_value()
 
     @intrinsic
-    def part(typing, c, c_first, c_row, start, start_first, a, a_first, a_row, a_step, b, b_first, b_step, steps):
+    def part(
+        typing: Any,
+        c: Any,
+        c_first: Any,
+        c_row: Any,
+        start: Any,
+        start_first: Any,
+        a: Any,
+        a_first: Any,
+        a_row: Any,
+        a_step: Any,
+        b: Any,
+        b_first: Any,
+        b_step: Any,
+        steps: Any,
+    ) -> Any:
         place = types.intp
         return types.void(c, place, place, start, place, a, place, place, place, b, place, place, place), generate
 
@@ -167,7 +182,7 @@ def tanh(x: np.ndarray, first: int, count: int) -> None:
 
 
 @intrinsic
-def from_bits(typing, bits):
+def from_bits(typing: Any, bits: Any) -> Any:
     """Returns the float32 that the 32 ``bits`` of an integer mean."""
 
     def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: tuple[ir.Value, ...]) -> ir.Value:
@@ -195,4 +210,5 @@ def exp(x: np.ndarray, first: int, count: int) -> None:
         p = p * r + np.float32(1.6666665459e-1)
         p = p * r + np.float32(5.0000001201e-1)
         p = p * r * r + r + np.float32(1.0)
-        part[j] = p * from_bits((np.int32(whole) + np.int32(127)) << np.int32(23))
+        bits = (np.int32(whole) + np.int32(127)) << np.int32(23)
+        part[j] = p * from_bits(bits)  # type: ignore[call-arg]  # Numba's types know no call of an intrinsic

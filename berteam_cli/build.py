@@ -163,7 +163,7 @@ def selector(config: TrainConfig, field: Field, game: Env, device: str) -> Selec
     opponents = settings.pop("opponents", "own")
     average = {key: settings.pop(key) for key in ("reservoir", "sharpening") if key in settings}
     try:
-        chosen = SELECTORS[name](field=field, **settings)
+        chosen: Any = SELECTORS[name](field=field, **settings)  # only berteam has opponents, and what they ask of it
         return Fictitious(chosen, **average) if opponents == "average" else chosen
     except ValueError as error:
         raise InputError(str(error)) from error

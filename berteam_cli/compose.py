@@ -164,7 +164,9 @@ def check_learner(config: DictConfig, overrides: list[Override]) -> None:
     Raises:
         InputError: it has none.
     """
-    said = [x.key_or_group for x in overrides if x.key_or_group.split(".")[0] == "learner" and "@" not in x.input_line]
+    said = [
+        x.key_or_group for x in overrides if x.key_or_group.split(".")[0] == "learner" and "@" not in str(x.input_line)
+    ]
     islands = config.get("population", {}).get("islands", {})
     if said and not any(OmegaConf.is_interpolation(island, "learner") for island in islands.values()):
         if not islands:
@@ -277,7 +279,7 @@ def check_keys(command: str, searched: list[str], overrides: list[Override]) -> 
 def keys(config: DictConfig, prefix: str = "") -> list[str]:
     """Returns all dotted keys of a config."""
     found: list[str] = []
-    for key in config:
+    for key in map(str, config):
         path = f"{prefix}{key}"
         found.append(path)
         node = None if OmegaConf.is_missing(config, key) else config._get_node(key)

@@ -61,7 +61,7 @@ def claim(folder: Path, on_exists: str) -> None:
         raise InputError(f"out={folder} cannot be written: {error.strerror or error}.") from error
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+def write_whole(path: Path, write: Callable[[Path], object]) -> None:
     """Makes ``path`` with ``write``; there is never half of it.
 
     Raises:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from berteam_cli.acting import Policies
 from berteam_cli.env.base import Env, Results, Stoppable, Trajectories, blank_results
@@ -80,8 +83,9 @@ def experience_of(players: Ints, results: Results) -> Experience:
     seen = (players[:kept], results.observations, results.actions, results.rewards)
     if not results.lengths.any():
         return Experience(*seen, results.steps[:kept], results.terminated[:kept])
-    alone = (column.reshape(-1, 1, *column.shape[2:]) for column in seen)
-    return Experience(*alone, results.lengths.ravel(), results.ended.ravel())
+    columns: Iterable[npt.NDArray[Any]] = (column.reshape(-1, 1, *column.shape[2:]) for column in seen)
+    members, observations, actions, rewards = columns
+    return Experience(members, observations, actions, rewards, results.lengths.ravel(), results.ended.ravel())
 
 
 def seeds_of(key: int, games: int) -> np.ndarray:

@@ -7,6 +7,7 @@ import resource
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -85,7 +86,8 @@ def fits_there(islands: list[Island], played: int, games: int, limit: int, whole
     if largest is None or played > takes:
         most = max((limit - members) * games // played, 0)
         raise InputError(f"games_per_epoch must be <= {most}, but is {games}: {said}.")
-    key, learner, most = largest.learner.buffer, largest.learner, 0
+    learner: Any = largest.learner  # of whatever kind, a frozen dataclass
+    key, most = learner.buffer, 0
     if key:
         one, two = (replace(learner, **{key: size}).state_bytes(largest.size) for size in (1, 2))
         most = 1 + (limit - (total - takes) - one) // (two - one)

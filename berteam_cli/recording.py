@@ -58,8 +58,7 @@ class Recorder:
         self.tables.add("learning", self.learning_rows(run, report))
         self.tables.add("generations", self.generation_rows(run, report))
         figures = (selecting.loss, selecting.updates, selecting.buffer, effective, entropy, exploited)
-        figures += (selecting.skipped,)
-        self.tables.add("selector", [(run.epoch, *figures)])
+        self.tables.add("selector", [(run.epoch, *figures, selecting.skipped)])
         clock.lap("record_s")
         seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
         self.tables.add("timing", [tuple(seconds[column] for column in COLUMNS["timing"])])

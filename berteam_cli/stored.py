@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import yaml
 from omegaconf import DictConfig, OmegaConf
@@ -64,7 +64,7 @@ def stored_config(folder: Path) -> DictConfig:
         for name, island in plain.population.islands.items():
             typed.population.islands[name] = OmegaConf.structured(IslandConfig)
             typed.population.islands[name].learner = OmegaConf.structured(SCHEMAS["learner"][island.learner.name])
-        return OmegaConf.merge(typed, plain)
+        return cast("DictConfig", OmegaConf.merge(typed, plain))
     except (OmegaConfBaseException, AttributeError, KeyError, TypeError) as error:
         said = str(error).splitlines()[0]
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
@@ -80,7 +80,7 @@ def whole_choice(group: str, name: str) -> DictConfig:
         raise InputError.choice(group, name, SCHEMAS[group])
     text = files("berteam_cli.conf").joinpath(group, f"{name}.yaml").read_text(encoding="utf-8")
     values = {key: value for key, value in yaml.safe_load(text).items() if key != "defaults"}
-    return OmegaConf.merge(OmegaConf.structured(SCHEMAS[group][name]), values)
+    return cast("DictConfig", OmegaConf.merge(OmegaConf.structured(SCHEMAS[group][name]), values))
 
 
 def goes_on(config: TrainConfig, folder: Path | None) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.random import Generator
@@ -16,7 +16,7 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.optimizer.base import Optimizer, Replacement
 from berteam_cli.outcomes import Ints, Outcomes
 from berteam_cli.population import Population, founded, policies
-from berteam_cli.selector.base import Selecting, Selector
+from berteam_cli.selector.base import Answering, Selecting, Selector
 
 FOUNDING, EPOCHS, RECORDS, EVALUATION, PAYOFFS = range(5)  # what a stream of random numbers is for
 
@@ -96,7 +96,7 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     acting = policies(optimizer.islands, population, explore=True)
     outcomes, experience = parts.games.play(acting, lineups, key(play), record=watched(parts), room=parts.room)
     if selector.answers:  # each opponent once more, with teams chosen on what was seen of it
-        lineups = selector.answer(run.selection, lineups, experience, population.age, select)
+        lineups = cast("Answering[Any]", selector).answer(run.selection, lineups, experience, population.age, select)
         again = parts.games.play(acting, lineups, key(play), record=True)
         outcomes, experience = outcomes.followed_by(again[0]), experience.followed_by(again[1])
     population = optimizer.rate(population, outcomes)

@@ -126,8 +126,8 @@ def versus_rows(found: Comparison, played: Played, names: list[str], of: Ints) -
     above = superiority(found.algorithms.mixed_samples)
     for a, b in np.ndindex(len(names), len(names)):
         if a != b:
-            score = with_interval(found.algorithms.scores[a, b], found.algorithms.score_samples[:, a, b])
-            better = with_interval(found.improvement[a, b], found.improvement_samples[:, a, b])
+            score = with_interval(float(found.algorithms.scores[a, b]), found.algorithms.score_samples[:, a, b])
+            better = with_interval(float(found.improvement[a, b]), found.improvement_samples[:, a, b])
             yield names[a], names[b], counts[a, b].sum(), *counts[a, b], *score, above[a, b], *better
 
 

@@ -17,6 +17,7 @@ from berteam_cli.config_commands import TournamentConfig
 from berteam_cli.config_groups import EnvConfig, MctfConfig
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.evaluation.reference import table_name
+from berteam_cli.founding import check_policies
 from berteam_cli.games import Games
 from berteam_cli.outcomes import Ints
 from berteam_cli.population import names, policies
@@ -133,7 +134,7 @@ def called_policies(config: TournamentConfig, games: Games) -> list[str]:
     """
     env = games.env
     called = config.policies or list(env.fixed_policies[: env.standard_policies])
-    build.check_policies(called, env, "policies")
+    check_policies(called, env, "policies")
     twice = sorted({name for name in called if called.count(name) > 1})
     if twice:
         raise InputError(f"policies must name each policy once, but has {', '.join(twice)} more than once.")
@@ -210,7 +211,8 @@ def of_runs(config: TournamentConfig, runs: list[Path]) -> Entry:
     Raises:
         InputError: there is no such run, or the runs have different games.
     """
-    tables, teams, called, epochs, first = [], [], [], [], 0
+    tables, teams, called, first = [], [], [], 0
+    epochs: list[int] = []
     game = None
     for folder in runs:
         if config.out and Path(config.out).resolve() == folder.resolve():

@@ -113,8 +113,8 @@ def show(folder: Path, top: int) -> None:
     """
     console = Console(width=None if Console().is_terminal else 120)
     if (folder / "sweep.csv").exists():
-        shown = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
-        console.print(printed(f"Sweep {folder}", pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[shown]))
+        columns = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
+        console.print(printed(f"Sweep {folder}", pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[columns]))
         return
     manifest = read_manifest(folder)
     console.print(f"{folder}: {manifest['status']}, started {manifest['started']}", highlight=False)
@@ -124,8 +124,8 @@ def show(folder: Path, top: int) -> None:
     if summary is not None and len(summary):
         console.print(printed("Figures", summary.T.reset_index().set_axis(["figure", "value"], axis=1)))
     if elo is not None and len(elo):
-        shown = ["rank", "team", "members", "elo", "elo_low", "elo_high", "wins", "draws", "losses", "probability"]
-        console.print(printed(f"Strongest of {len(elo)} rated teams", elo[shown].head(top)))
+        ranked = ["rank", "team", "members", "elo", "elo_low", "elo_high", "wins", "draws", "losses", "probability"]
+        console.print(printed(f"Strongest of {len(elo)} rated teams", elo[ranked].head(top)))
     if teams is not None and len(teams):
         last = teams[teams.epoch == teams.epoch.max()].sort_values("probability", ascending=False, kind="stable")
         console.print(printed(f"Most probable teams after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))

@@ -14,6 +14,7 @@ from berteam_cli.acting import Policies, fixed_policies
 from berteam_cli.command.inspect import read_table
 from berteam_cli.config import checked
 from berteam_cli.config_commands import ReplayConfig
+from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.folder import new_folder, read_manifest, write_whole
@@ -141,7 +142,7 @@ def of_run(config: ReplayConfig, folder: Path) -> Match:
     return Match(game, policies(islands, population, explore=False), called, blue, red, title)
 
 
-def filmable(game: object) -> Mctf:
+def filmable(game: Env) -> Mctf:
     """Returns ``game`` if it can be filmed.
 
     Raises:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 from berteam_cli.config_commands import ReportConfig
@@ -46,7 +47,7 @@ def report(config: ReportConfig, _: str, out: Path | None) -> float:
         for plot in x.plots:
             picture = folder / (f"{x.key}_{plot.name}.png" if several else f"{plot.name}.png")
             if plot.png:
-                write_whole(picture, lambda part, png=plot.png: part.write_bytes(png))
+                write_whole(picture, partial(Path.write_bytes, data=plot.png))
             else:
                 picture.unlink(missing_ok=True)  # of an earlier report
     write_whole(folder / PAGE, lambda part: part.write_text(text, encoding="utf-8"))

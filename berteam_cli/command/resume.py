@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -42,7 +43,7 @@ def resume(folder: Path, overrides: list[str]) -> float:
         for choice in chosen:
             stored.logger = whole_choice("logger", choice.partition("=")[2])
         changes = OmegaConf.from_dotlist([x for x in overrides if x not in chosen])
-        config = OmegaConf.merge(stored, changes, {"on_exists": "resume", "out": str(folder)})
+        config: Any = OmegaConf.merge(stored, changes, {"on_exists": "resume", "out": str(folder)})
     except OmegaConfBaseException as error:
         raise InputError(one_line(error)) from error
     try:

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -47,7 +48,11 @@ def write(sweep: Path) -> None:
         if not (path / MANIFEST).exists():
             continue
         facts = read_manifest(path)
-        row = {"job": int(path.name), "overrides": " ".join(facts.get("overrides", [])), "status": facts["status"]}
+        row: dict[Any, Any] = {
+            "job": int(path.name),
+            "overrides": " ".join(facts.get("overrides", [])),
+            "status": facts["status"],
+        }
         if (path / "summary.csv").exists():
             row |= pd.read_csv(path / "summary.csv", dtype={"best_team": str}).iloc[0].to_dict()
         rows.append(row | {"error": facts.get("error", "")})

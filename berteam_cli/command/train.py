@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from pathlib import Path
+from typing import Any
 
 from omegaconf import OmegaConf
 
@@ -68,7 +69,7 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
         manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
         with manifest.until_the_end(), stoppable() as stop:
-            told = OmegaConf.to_container(OmegaConf.create(text))
+            told: Any = OmegaConf.to_container(OmegaConf.create(text))
             with logger(config.logger, folder, manifest.facts, told) as also:
                 run, recorder = trained(config, folder, parts, saved, started, stop, also)
                 before = saved.seconds if saved else 0.0

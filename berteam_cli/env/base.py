@@ -40,27 +40,39 @@ class Results(NamedTuple):
 
 
 class Env(Protocol):
-    """A kind of game between S teams of T places; keeps settings only.
+    """A kind of game between S teams of T places; keeps settings only."""
 
-    Attributes:
-        name: of the config choice.
-        team_size: T.
-        sides: S, at least 2.
-        observation_size: O.
-        actions: A, how many discrete actions there are.
-        longest: L, steps after which every game is over.
-        fixed_policies: names of the scripted players that come with the game.
-        standard_policies: how many of them, the first, tournaments are among and teams are measured against.
-    """
+    @property
+    def name(self) -> str:
+        """Of the config choice."""
 
-    name: str
-    team_size: int
-    sides: int
-    observation_size: int
-    actions: int
-    longest: int
-    fixed_policies: tuple[str, ...]
-    standard_policies: int
+    @property
+    def team_size(self) -> int:
+        """T."""
+
+    @property
+    def sides(self) -> int:
+        """S, at least 2."""
+
+    @property
+    def observation_size(self) -> int:
+        """O."""
+
+    @property
+    def actions(self) -> int:
+        """A, how many discrete actions there are."""
+
+    @property
+    def longest(self) -> int:
+        """L, steps after which every game is over."""
+
+    @property
+    def fixed_policies(self) -> tuple[str, ...]:
+        """Names of the scripted players that come with the game."""
+
+    @property
+    def standard_policies(self) -> int:
+        """How many of them, the first, tournaments are among and teams are measured against."""
 
     def play(
         self,

@@ -127,7 +127,8 @@ def begun(env: ParallelEnv[str, Any, Any], facts: Facts, seed: int) -> list[Play
     for name in facts.agents:
         if name not in env.agents:
             raise Unfit(f"agent {name} is not in the game after reset; every agent must be")
-        player = Player(name, env.observation_space(name), facts.observation_size, int(env.action_space(name).start))
+        actions: Any = env.action_space(name)  # Discrete, as facts_of saw to
+        player = Player(name, env.observation_space(name), facts.observation_size, int(actions.start))
         player.observations.append(vector(player, entry(observations, player, "observations")))
         player.info = infos.get(name, {})
         players.append(player)

@@ -70,13 +70,13 @@ def serve(connection: Connection, game: Game) -> None:
         return
     try:
         connection.send(facts)
-        policies = None
+        policies: Any = None  # the first request brings them
         while True:
             request = connection.recv()
             policies = request.policies or policies
             for rows, seed in zip(request.players, request.seeds, strict=True):
                 try:
-                    answer = played(env, game, facts, policies, rows, seed, record=request.record)
+                    answer: Any = played(env, game, facts, policies, rows, seed, record=request.record)
                 except Exception as error:
                     answer = Failed(said(error), traceback.format_exc())
                 connection.send(answer)

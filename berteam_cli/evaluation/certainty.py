@@ -176,7 +176,7 @@ def cycles(games: Cells, players: int) -> list[tuple[tuple[int, ...], float, flo
     """
     scores, low = surely_beaten(games, players)
     beats = low > 0.5
-    found = []
+    found: list[tuple[tuple[int, ...], float, float]] = []
     for a in range(players):  # the first of the three by index, so that no circle is found twice
         for b in np.flatnonzero(beats[a, a + 1 :]) + a + 1:
             for c in np.flatnonzero(beats[b, a + 1 :] & beats[a + 1 :, a]) + a + 1:

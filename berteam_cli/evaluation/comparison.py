@@ -223,7 +223,7 @@ def resampled(played: Played, reference: Reference, rng: Generator) -> Resampled
 
 def points_of(counts: Ints | Floats) -> Floats:
     """Returns the points of (..., 3) games won, drawn and lost."""
-    return counts[..., 0] + 0.5 * counts[..., 1]
+    return counts[..., 0] + np.float64(0.5) * counts[..., 1]
 
 
 def figures(anew: Resampled, shares: Floats, anchors: Floats) -> Figures:

@@ -108,7 +108,8 @@ def encounters(
 
 def met(run: Run, parts: Parts, acting: Policies, theirs: Ints, rng: Generator) -> Floats:
     """Returns (2, B) our scores of the first and the second game against each of ``theirs``, (B, T)."""
-    games, selector, count = parts.games, parts.selector, len(theirs)
+    games, count = parts.games, len(theirs)
+    selector: Any = parts.selector  # one that looks at games
     ours = selector.sample(run.selection, count, rng)
     first, experience = games.play(acting, both_sides(ours, theirs, count), key(rng), record=True)
     mine = in_turn(count, count)

@@ -150,7 +150,8 @@ def programme(objective: Floats, **constraints: Any) -> Floats:
     Raises:
         ArithmeticError: there is no such thing.
     """
-    for options in (PRECISE, {}):
+    choices: tuple[Any, ...] = (PRECISE, {})
+    for options in choices:
         solved = linprog(objective, options=options, **constraints)
         if solved.success:
             return np.asarray(solved.x)

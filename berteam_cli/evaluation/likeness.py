@@ -22,7 +22,8 @@ def likeness(run: Run, parts: Parts, behaviour: Floats) -> dict[str, list[tuple[
         behaviour: (N,) aggression of each member, NaN where it is not known.
     """
     islands = parts.optimizer.islands
-    similarity = cosines(parts.selector.embeddings(run.selection))
+    selector: Any = parts.selector  # an Embedding
+    similarity = cosines(selector.embeddings(run.selection))
     home = [islands[i] for i in island_of(islands)]
     labels = [x.name for x in home], [x.learner.algorithm for x in home]
     found = groups(*labels, run.population.fitness, behaviour)

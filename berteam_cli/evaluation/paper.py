@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -63,7 +63,7 @@ def fixed(quantity: str, found: Reproduced) -> Interval:
     runs = next(iter(found.runs.values()))
     elos = table(found.tournament, "elo").set_index("team")
     if kind == "Elo":
-        return interval_of(elos.loc[name], ("elo", "elo_low", "elo_high"))
+        return interval_of(cast("pd.Series[Any]", elos.loc[name]), ("elo", "elo_low", "elo_high"))
     teams = list(elos.index[:7]) if name == "the seven best teams" else [name]
     return over_seeds(runs, lambda run: (float(chances(run).reindex(teams).sum()), math.nan, math.nan))
 
@@ -127,4 +127,5 @@ def table(folder: Path, name: str) -> pd.DataFrame:
 def entry(run: Path, name: str, column: str, value: str) -> pd.Series:
     """Returns the row of an evaluation's table in which ``column`` is ``value``; nothing but NaN without such a row."""
     found = table(run / EVALUATION, name).set_index(column)
-    return found.loc[value] if value in found.index else pd.Series(math.nan, index=found.columns)
+    row = found.loc[value] if value in found.index else pd.Series(math.nan, index=found.columns)
+    return cast("pd.Series[Any]", row)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -63,7 +64,7 @@ def play_all(
     )
 
 
-def columns(lineups: Lineups) -> tuple[npt.NDArray, ...]:
+def columns(lineups: Lineups) -> tuple[npt.NDArray[Any], ...]:
     """Returns the arrays of ``lineups``."""
     return lineups.teams, lineups.captains, lineups.log_chances
 

@@ -43,11 +43,11 @@ class Sprt:
 
     def log_ratio(self, wins: Ints | Floats, draws: Ints | Floats, losses: Ints | Floats) -> Floats:
         """Returns the log likelihood ratio of elo1 to elo0, for games of the first player; of any shape."""
-        won, drawn, lost = (np.asarray(x) + UNSEEN for x in (wins, draws, losses))
+        won, drawn, lost = (np.asarray(x, dtype=np.float64) + UNSEEN for x in (wins, draws, losses))
         games = won + drawn + lost
         mean = (won + 0.5 * drawn) / games
         variance = (won * (1 - mean) ** 2 + drawn * (0.5 - mean) ** 2 + lost * mean**2) / games
-        low, high = (float(expected(elo / POINTS_PER_NAT, 0.0)) for elo in (self.elo0, self.elo1))
+        low, high = (float(expected(np.asarray(elo / POINTS_PER_NAT), 0.0)) for elo in (self.elo0, self.elo1))
         return games * (high - low) * (2 * mean - low - high) / (2 * variance)
 
     def decided(self, log_ratio: Floats) -> Ints:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +31,7 @@ class Sheet:
     name: str
     batch: int
 
-    def begun(self, done: npt.NDArray) -> int:
+    def begun(self, done: npt.NDArray[Any]) -> int:
         """Reads the rows kept into ``done`` and returns how many they are, whole batches only.
 
         A sheet of other work is begun anew.
@@ -51,13 +52,13 @@ class Sheet:
         about.write_text(json.dumps({"games": self.name}), encoding="utf-8")
         return whole
 
-    def add(self, rows: npt.NDArray) -> None:
+    def add(self, rows: npt.NDArray[Any]) -> None:
         """Adds a batch of ``rows``."""
         with self.path.with_suffix(".games").open("ab") as file:
             file.write(rows.tobytes())
 
 
-def named(games: Games, policies: Policies, arrays: Iterable[npt.NDArray], seed: int, batch: int) -> str:
+def named(games: Games, policies: Policies, arrays: Iterable[npt.NDArray[Any]], seed: int, batch: int) -> str:
     """Returns a name that only the same games of the same players have, whom ``arrays`` list."""
     digest = hashlib.sha256(json.dumps([games.env.fingerprint(), seed, batch], sort_keys=True).encode())
     for array in (*policies, *arrays):

@@ -92,7 +92,7 @@ class Truth:
                 return float(weights @ self.elos), math.nan
             mean = chosen.draws @ self.elos / drawn
             scatter = chosen.draws @ (self.elos - mean) ** 2 / (drawn - 1)  # the teams' own errors are in it
-            variance = rest**2 * scatter / drawn
+            variance = float(rest**2 * scatter / drawn)
             quantile = float(stdtrit(drawn - 1, 0.975))
             errors = np.where(chosen.listed, errors, 0.0)
         variance += ((weights * errors) ** 2).sum()

@@ -54,8 +54,13 @@ class Learner(Protocol[S]):
     replay buffers for every epoch would cost more than the learning.
     """
 
-    algorithm: str
-    buffer: str  # the setting that says how many steps a member keeps; empty where it keeps none
+    @property
+    def algorithm(self) -> str:
+        """What learns, as the config calls it."""
+
+    @property
+    def buffer(self) -> str:
+        """The setting that says how many steps a member keeps; empty where it keeps none."""
 
     def init(self, members: int, rng: Generator) -> S:
         """Returns the state of ``members`` members that have not learnt yet."""

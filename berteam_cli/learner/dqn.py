@@ -202,7 +202,8 @@ class Dqn:
     def whole(self, held: dict[str, Any]) -> Replay:
         """Returns replay buffers that begin with the columns ``held``, (M, steps), of ``tensors``."""
         replay = empty(len(held["actions"]), self.buffer_size, self.observation_size)
-        for column, begun in zip(replay, (held[name] for name in Replay._fields), strict=True):
+        for name in Replay._fields:
+            column, begun = getattr(replay, name), held[name]
             column[:, : begun.shape[1]] = begun
         return replay
 

@@ -140,7 +140,7 @@ def set_up(model: BaseAlgorithm, space: Box, actions: int) -> None:
 
 def section(member: Trained, first: int, last: int | None) -> Trained:
     """Returns the weights ``first`` to before ``last`` of one member, with what Adam remembers of them."""
-    return Trained(*(column[first:last] for column in member[:3]), updates=member.updates)
+    return Trained._make((*(column[first:last] for column in member[:3]), member.updates))
 
 
 def take_over(policy: Any, modules: tuple[torch.nn.Module, ...], member: Trained, sizes: tuple[int, ...]) -> None:
@@ -164,7 +164,7 @@ def take_over(policy: Any, modules: tuple[torch.nn.Module, ...], member: Trained
 def parameters(*modules: torch.nn.Module) -> list[torch.nn.Parameter]:
     """Returns matrix and bias of each linear layer in ``modules``."""
     found = [each for module in modules for each in module.modules() if isinstance(each, torch.nn.Linear)]
-    return [part for linear in found for part in (linear.weight, linear.bias)]
+    return [part for linear in found for part in (linear.weight, linear.bias) if isinstance(part, torch.nn.Parameter)]
 
 
 def torch_layers(flat: Singles, sizes: tuple[int, ...]) -> list[torch.Tensor]:

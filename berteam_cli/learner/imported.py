@@ -54,11 +54,11 @@ class Imported:
             raise RuntimeError("The files were not read, as a checkpoint was to be.")
         if members != len(self.called):
             raise ValueError(f"members must be {len(self.called)}, one for each file, but is {members}.")
-        return ImportedState(np.arange(members), Policies(*(column.copy() for column in self.networks)))
+        return ImportedState(np.arange(members), Policies._make(column.copy() for column in self.networks))
 
     def policies(self, state: ImportedState, *, explore: bool) -> Policies:
         """Returns the networks, which act the same whether they ``explore`` or not."""
-        return Policies(*(column.copy() for column in state.policies))
+        return Policies._make(column.copy() for column in state.policies)
 
     def state_bytes(self, members: int) -> int:
         """Returns the bytes of the networks that were read."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,11 @@ from numpy.random import Generator
 
 from berteam_cli.arithmetic import multiply, tanh
 
+if TYPE_CHECKING:
+    from torch import Tensor
+
 Singles = npt.NDArray[np.float32]
+Weights = TypeVar("Weights", Singles, "Tensor")
 
 # Sums may be reordered to fill vector registers, in one way for each machine; NaN and infinity stay what they are.
 FAST = {"reassoc", "contract", "nsz"}
@@ -31,7 +36,7 @@ def weight_count(sizes: npt.NDArray[np.int64]) -> int:
     return ((sizes[:-1] + 1) * sizes[1:]).sum()
 
 
-def layers(weights: Singles, sizes: tuple[int, ...]) -> list[tuple[Singles, Singles]]:
+def layers(weights: Weights, sizes: tuple[int, ...]) -> list[tuple[Weights, Weights]]:
     """Returns for each layer its matrices (K, in, out) and biases (K, out), as views.
 
     Args:

@@ -204,12 +204,12 @@ class Ppo:
         """Makes ``child`` a copy of ``parent`` with an empty rollout, since the parent's steps are not its own."""
         for column in (*state.trained, state.collected):
             column[child] = column[parent]
-        for column in (*state.rollouts, state.filled):
-            column[child] = 0
+        for emptied in (*state.rollouts, state.filled):
+            emptied[child] = 0
 
     def tensors(self, state: PpoState) -> dict[str, Any]:
         """Returns all that ``state`` holds, by name."""
-        columns = {**state.trained._asdict(), **state.rollouts._asdict()}
+        columns: dict[str, Any] = {**state.trained._asdict(), **state.rollouts._asdict()}
         columns |= {"filled": state.filled, "collected": state.collected}
         return {name: torch.from_numpy(column) for name, column in columns.items()}
 
@@ -224,7 +224,9 @@ class Ppo:
         )
 
 
-def learning(row: int, figures: Sequence[Floats], updates: int, steps: int, failures: int) -> Learning:
+def learning(
+    row: int, figures: Sequence[Floats] | Sequence[list[float]], updates: int, steps: int, failures: int
+) -> Learning:
     """Returns what a member learnt.
 
     Args:

@@ -99,7 +99,7 @@ def stitched(what: Seen, values: Singles, log_probs: Singles, gamma: float) -> S
     next_values[last] = 0.0
     rewards[last[what.timeout]] += np.float32(gamma) * values[what.after[what.timeout]]
     columns = (what.observations, what.actions, rewards, values, log_probs, next_values, ends)
-    return Steps(*(column[acted] for column in columns))
+    return Steps._make(column[acted] for column in columns)
 
 
 def append(rollouts: Steps, filled: Ints, row: int, new: Steps, start: int) -> int:

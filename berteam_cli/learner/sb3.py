@@ -90,7 +90,7 @@ class Sb3:
             (np.stack([matrix for matrix, _ in layer]), np.stack([bias for _, bias in layer]))
             for layer in zip(*(acting_layers(model) for model in state), strict=True)
         ]
-        tanh = state[0].policy.activation_fn is nn.Tanh  # type: ignore[comparison-overlap]
+        tanh = state[0].policy.activation_fn is nn.Tanh
         if isinstance(state[0], OnPolicyAlgorithm):
             return networks(SAMPLED, layers, tanh=tanh)
         chances = [exploration(model, self.schedule_steps) if explore else 0.0 for model in state]

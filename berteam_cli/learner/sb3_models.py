@@ -98,7 +98,7 @@ def built(
     if activation is not None:
         architecture["activation_fn"] = ACTIVATIONS[activation]
     spaces = Spaces(observation_size, actions)
-    model = kind("MlpPolicy", spaces, policy_kwargs=architecture, device="cpu", **options)  # type: ignore[arg-type]
+    model = kind("MlpPolicy", spaces, policy_kwargs=architecture, device="cpu", **options)
     model.set_logger(Logger(None, []))  # `configure` would make a folder
     return model
 

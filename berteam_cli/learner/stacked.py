@@ -7,16 +7,19 @@ Adam are its own. ``mlp`` and ``adam`` say the same one member at a time.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from berteam_cli.learner.adam import MEAN_DECAY, SQUARE_DECAY, Adam, Trained
+from berteam_cli.learner.adam import MEAN_DECAY, SQUARE_DECAY, Adam
 from berteam_cli.learner.mlp import layers
 
 S = TypeVar("S", bound=Any)  # a NamedTuple with a field ``trained``
+
+OnDevice: TypeAlias = Any
+"""A NamedTuple of a compiled learner, such as Trained or Steps, whose columns are tensors here and not arrays."""
 
 
 def outputs(weights: Tensor, sizes: tuple[int, ...], smooth: bool, x: Tensor) -> Tensor:
@@ -36,7 +39,7 @@ def outputs(weights: Tensor, sizes: tuple[int, ...], smooth: bool, x: Tensor) ->
     return x
 
 
-def descend(adam: Adam, trained: Trained, gradient: Tensor, active: Tensor) -> None:
+def descend(adam: Adam, trained: OnDevice, gradient: Tensor, active: Tensor) -> None:
     """Moves K members a step against their gradients; see ``adam.descend``.
 
     Args:

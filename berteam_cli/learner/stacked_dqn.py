@@ -16,7 +16,7 @@ from berteam_cli.learner.adam import Trained
 from berteam_cli.learner.base import Learning
 from berteam_cli.learner.dqn import Dqn, DqnState
 from berteam_cli.learner.replay import Replay, latest
-from berteam_cli.learner.stacked import acting, descend, on, outputs, put_where_finite, taken
+from berteam_cli.learner.stacked import OnDevice, acting, descend, on, outputs, put_where_finite, taken
 from berteam_cli.learner.temporal import FIGURES
 from berteam_cli.outcomes import Experience, Ints
 from berteam_cli.workers import Workers
@@ -36,12 +36,12 @@ class StackedDqn(Dqn):
         """Returns the state of ``members`` members that have not learnt yet."""
         return self.restored(Dqn.tensors(self, super().init(members, rng)))
 
-    def policies(self, state: DqnState, *, explore: bool) -> Policies:
+    def policies(self, state: OnDevice, *, explore: bool) -> Policies:
         """Returns the members' greedy policies, which err at random as their schedules say if they ``explore``."""
         return super().policies(acting(state), explore=explore)
 
     def learn(
-        self, state: DqnState, experience: Experience, first: int, rng: Generator, workers: Workers
+        self, state: OnDevice, experience: Experience, first: int, rng: Generator, workers: Workers
     ) -> list[Learning]:
         """Adds the members' steps to their replay buffers; then all take the gradient steps these allow, together.
 
@@ -73,7 +73,7 @@ class StackedDqn(Dqn):
         return learnt
 
     def stepped(
-        self, state: DqnState, rows: list[int], batches: list[Ints], renewals: list[Ints]
+        self, state: OnDevice, rows: list[int], batches: list[Ints], renewals: list[Ints]
     ) -> tuple[list[list[float]], list[bool]]:
         """Takes gradient steps of the members ``rows``, some more than others.
 
@@ -94,16 +94,16 @@ class StackedDqn(Dqn):
             at[k, : len(places)], renews[k, : len(targets)] = places, targets
         chosen = torch.tensor(rows, device=self.device)
         newest = on(self.device, (state.collected[rows] - 1) % self.buffer_size)
-        trained = Trained(*taken(state.trained, chosen))
+        trained: OnDevice = Trained._make(taken(state.trained, chosen))
         target = state.target[chosen]
         sums = torch.zeros(len(rows), len(FIGURES), dtype=torch.float64, device=self.device)
-        places, renewing = on(self.device, at), on(self.device, renews)
+        steps, renewing = on(self.device, at), on(self.device, renews)
         for step in range(most + 1):
             target = self.followed(target, trained.weights, renewing[:, step])
             if step == most:
                 break
             active = step < counts
-            gradient, figures = self.gradient(state, chosen, newest, places[:, step], trained.weights, target)
+            gradient, figures = self.gradient(state, chosen, newest, steps[:, step], trained.weights, target)
             sums += torch.where(active[:, None], figures, 0.0)
             descend(self.adam, trained, gradient, active)
         means = sums / counts.clamp(min=1)[:, None]
@@ -119,7 +119,7 @@ class StackedDqn(Dqn):
         return target * stays + weights * (1.0 - stays)
 
     def gradient(
-        self, state: DqnState, rows: Tensor, newest: Tensor, at: Tensor, weights: Tensor, target: Tensor
+        self, state: OnDevice, rows: Tensor, newest: Tensor, at: Tensor, weights: Tensor, target: Tensor
     ) -> tuple[Tensor, Tensor]:
         """Returns the gradients (K, W) of the members' losses, and their losses and mean Q, (K, 2).
 
@@ -147,7 +147,7 @@ class StackedDqn(Dqn):
         (gradient,) = torch.autograd.grad(loss.sum(), weights)
         return gradient, torch.stack([loss, q.mean(dim=1)], dim=1).detach().double()
 
-    def tensors(self, state: DqnState) -> dict[str, Any]:
+    def tensors(self, state: OnDevice) -> dict[str, Any]:
         """Returns all that ``state`` holds, by name; of the replay buffers what the fullest one holds."""
         replay = {name: column[:, : self.held(state)] for name, column in state.replay._asdict().items()}
         columns = {**state.trained._asdict(), "target": state.target, **replay}
@@ -157,8 +157,8 @@ class StackedDqn(Dqn):
         """Returns the state that ``tensors`` gave these, on the device."""
         replay = self.whole({name: tensors[name].cpu().numpy() for name in Replay._fields})
         return DqnState(
-            Trained(*(tensors[name].to(self.device, copy=True) for name in Trained._fields)),
+            Trained._make(tensors[name].to(self.device, copy=True) for name in Trained._fields),
             tensors["target"].to(self.device, copy=True),
-            Replay(*(on(self.device, column) for column in replay)),
+            Replay._make(on(self.device, column) for column in replay),
             tensors["collected"].cpu().numpy().copy(),
         )

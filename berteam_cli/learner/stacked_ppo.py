@@ -16,7 +16,7 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.learner.mlp import weight_count
 from berteam_cli.learner.ppo import Ppo, PpoState, learning
 from berteam_cli.learner.rollout import Seen, Steps, advantages, append, seen, stitched
-from berteam_cli.learner.stacked import acting, descend, on, outputs, put_where_finite, taken
+from berteam_cli.learner.stacked import OnDevice, acting, descend, on, outputs, put_where_finite, taken
 from berteam_cli.learner.surrogate import FIGURES, KL, LOSSES, Sample
 from berteam_cli.outcomes import Experience
 from berteam_cli.workers import Workers
@@ -36,12 +36,12 @@ class StackedPpo(Ppo):
         """Returns the state of ``members`` members that have not learnt yet."""
         return self.restored(Ppo.tensors(self, super().init(members, rng)))
 
-    def policies(self, state: PpoState, *, explore: bool) -> Policies:
+    def policies(self, state: OnDevice, *, explore: bool) -> Policies:
         """Returns the members' stochastic policies."""
         return super().policies(acting(state), explore=explore)
 
     def learn(
-        self, state: PpoState, experience: Experience, first: int, rng: Generator, workers: Workers
+        self, state: OnDevice, experience: Experience, first: int, rng: Generator, workers: Workers
     ) -> list[Learning]:
         """Adds the members' steps to their rollouts; all whose are full learn from them together.
 
@@ -68,7 +68,7 @@ class StackedPpo(Ppo):
         after = state.trained.updates.tolist()
         return [learning(row, figures[row], after[row] - before[row], used[row], failures[row]) for row in rows]
 
-    def judged_together(self, state: PpoState, rows: list[int], saw: list[Seen]) -> list[Steps]:
+    def judged_together(self, state: OnDevice, rows: list[int], saw: list[Seen]) -> list[OnDevice]:
         """Returns the new steps of each member, with what its networks say of them before it learns."""
         if not rows:
             return []
@@ -84,7 +84,7 @@ class StackedPpo(Ppo):
         steps = [
             stitched(x, said[k, : len(x.actions)], logs[k, : len(x.actions)], self.gamma) for k, x in enumerate(saw)
         ]
-        return [Steps(*(on(self.device, column) for column in x)) for x in steps]
+        return [Steps._make(on(self.device, column) for column in x) for x in steps]
 
     def both(self, weights: Tensor, observations: Tensor) -> tuple[Tensor, Tensor]:
         """Returns the policies' outputs (K, n, A) and the values (K, n) of ``observations``, shape (K, n, O)."""
@@ -92,7 +92,7 @@ class StackedPpo(Ppo):
         logits = outputs(weights[:, :cut], self.policy_sizes, self.smooth, observations)
         return logits, outputs(weights[:, cut:], self.value_sizes, self.smooth, observations)[..., 0]
 
-    def updated(self, state: PpoState, due: list[int], rngs: list[Generator]) -> tuple[list[list[float]], list[bool]]:
+    def updated(self, state: OnDevice, due: list[int], rngs: list[Generator]) -> tuple[list[list[float]], list[bool]]:
         """Lets the members ``due`` learn from their full rollouts.
 
         Returns for each its figures, and whether they and its weights are finite; if not, it stays as it was.
@@ -100,7 +100,7 @@ class StackedPpo(Ppo):
         rows = torch.tensor(due, device=self.device)
         rollout = self.samples(state, rows)
         orders = on(self.device, np.stack([self.orders(rng) for rng in rngs]))  # (K, n_epochs, n_steps)
-        trained = Trained(*taken(state.trained, rows))
+        trained: OnDevice = Trained._make(taken(state.trained, rows))
         everyone = torch.arange(len(due), device=self.device)[:, None]
         sums = torch.zeros(len(due), len(FIGURES), dtype=torch.float64, device=self.device)
         seen_in_all = torch.zeros(len(due), device=self.device)
@@ -109,7 +109,7 @@ class StackedPpo(Ppo):
         for order in orders.unbind(dim=1):
             divergence, seen_in_pass, in_pass = torch.zeros_like(sums[:, KL]), torch.zeros_like(seen_in_all), near
             for at in order.split(self.minibatch_size, dim=1):
-                gradient, figures = self.gradient(trained.weights, Sample(*(x[everyone, at] for x in rollout)))
+                gradient, figures = self.gradient(trained.weights, Sample._make(x[everyone, at] for x in rollout))
                 sums += torch.where(near[:, None], figures, 0.0)
                 divergence += torch.where(near, figures[:, KL], 0.0)
                 seen_in_all += near
@@ -121,18 +121,19 @@ class StackedPpo(Ppo):
         means[:, KL] = last
         return means.tolist(), put_where_finite(state.trained, rows, trained, means[:, :LOSSES])
 
-    def samples(self, state: PpoState, rows: Tensor) -> Sample:
+    def samples(self, state: OnDevice, rows: Tensor) -> OnDevice:
         """Returns the full rollouts of the members ``rows`` with their advantages and returns, (K, n_steps)."""
-        rollouts = Steps(*taken(state.rollouts, rows))
+        rollouts: OnDevice = Steps._make(taken(state.rollouts, rows))
         host = [x.cpu().numpy() for x in (rollouts.rewards, rollouts.values, rollouts.next_values, rollouts.ends)]
-        each = [advantages(*member, self.gamma, self.gae_lambda) for member in zip(*host, strict=True)]
+        each = [
+            advantages(r, v, after, ends, self.gamma, self.gae_lambda) for r, v, after, ends in zip(*host, strict=True)
+        ]
         gains = on(self.device, np.stack(each))
         actions = rollouts.actions.long()
-        return Sample(
-            rollouts.observations, actions, rollouts.log_probs, gains, rollouts.values, gains + rollouts.values
-        )
+        returns = gains + rollouts.values
+        return Sample._make((rollouts.observations, actions, rollouts.log_probs, gains, rollouts.values, returns))
 
-    def gradient(self, weights: Tensor, sample: Sample) -> tuple[Tensor, Tensor]:
+    def gradient(self, weights: Tensor, sample: OnDevice) -> tuple[Tensor, Tensor]:
         """Returns the gradients (K, W) of the members' losses, and their figures (K, len(FIGURES)); see ``Surrogate``.
 
         Args:
@@ -159,7 +160,7 @@ class StackedPpo(Ppo):
         figures = torch.stack([loss, policy_loss, value_loss, entropy, approx_kl, clip_fraction], dim=1)
         return gradient, figures.detach().double()
 
-    def tensors(self, state: PpoState) -> dict[str, Any]:
+    def tensors(self, state: OnDevice) -> dict[str, Any]:
         """Returns all that ``state`` holds, by name."""
         columns = {**state.trained._asdict(), **state.rollouts._asdict()}
         counts = {"filled": state.filled, "collected": state.collected}
@@ -168,7 +169,7 @@ class StackedPpo(Ppo):
     def restored(self, tensors: dict[str, Any]) -> PpoState:
         """Returns the state that ``tensors`` gave these, on the device."""
         return PpoState(
-            Trained(*(tensors[name].to(self.device, copy=True) for name in Trained._fields)),
-            Steps(*(tensors[name].to(self.device, copy=True) for name in Steps._fields)),
+            Trained._make(tensors[name].to(self.device, copy=True) for name in Trained._fields),
+            Steps._make(tensors[name].to(self.device, copy=True) for name in Steps._fields),
             *(tensors[name].cpu().numpy().copy() for name in ("filled", "collected")),
         )

@@ -65,7 +65,7 @@ class Sample(NamedTuple):
 
 
 @compiled
-def policy_slope(loss: Surrogate, logits: Singles, sample: Sample, slope: Singles, figures: Singles) -> None:
+def policy_slope(loss: Surrogate, logits: Singles, sample: Sample, slope: Singles, figures: Floats) -> None:
     """Writes the derivative of the loss with respect to the policy's outputs.
 
     Args:
@@ -104,7 +104,7 @@ def policy_slope(loss: Surrogate, logits: Singles, sample: Sample, slope: Single
 
 
 @compiled
-def value_slope(loss: Surrogate, values: Singles, sample: Sample, slope: Singles, figures: Singles) -> None:
+def value_slope(loss: Surrogate, values: Singles, sample: Sample, slope: Singles, figures: Floats) -> None:
     """Writes the derivative of the loss with respect to the values (n, 1), and adds the figures to their sums."""
     n = len(values)
     reach = np.float32(loss.clip_range_vf)

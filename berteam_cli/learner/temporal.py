@@ -109,7 +109,7 @@ def learn_steps(
             figures[1] += q[i, action] / n
         backward(member.weights, sizes, difference.smooth, observations, values, slope, gradient)
         descend(adam, member, gradient)
-    follow(target, member.weights, difference.tau, renewals[steps])
+    follow(target, member.weights, difference.tau, int(renewals[steps]))
     return figures / max(steps, 1)
 
 

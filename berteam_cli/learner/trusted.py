@@ -54,7 +54,8 @@ def trusted_network(path: Path, observation_size: int, actions: int) -> Policies
 
 def loaded(path: Path) -> Any:
     """Returns the policy in a file, whatever algorithm made it."""
-    data, weights, _ = load_from_zip_file(path, device="cpu")
+    contents: Any = load_from_zip_file(path, device="cpu")  # whatever is None in it fails below
+    data, weights, _ = contents
     policy = data["policy_class"](
         data["observation_space"], data["action_space"], lambda _: 0.0, **(data["policy_kwargs"] or {})
     )

@@ -9,6 +9,7 @@ from typing import Protocol
 from numpy.random import Generator
 
 from berteam_cli.learner.base import Learning
+from berteam_cli.optimizer.fitness import FitnessRule
 from berteam_cli.outcomes import Experience, Ints, Outcomes
 from berteam_cli.population import Island, Population
 
@@ -46,8 +47,17 @@ row are the same team's; returns outcomes with the members as side 0 in every re
 class Optimizer(Protocol):
     """Makes a population better from its games; keeps settings only."""
 
-    islands: tuple[Island, ...]
-    learns: bool  # whether ``train`` wants to know what the players saw
+    @property
+    def islands(self) -> tuple[Island, ...]:
+        """Of the population."""
+
+    @property
+    def fitness(self) -> FitnessRule:
+        """How games become fitness."""
+
+    @property
+    def learns(self) -> bool:
+        """Whether ``train`` wants to know what the players saw."""
 
     def rate(self, population: Population, outcomes: Outcomes) -> Population:
         """Returns the population with the fitness that ``outcomes`` give."""

@@ -18,7 +18,9 @@ from berteam_cli.rating.elo import POINTS_PER_NAT, points, softmax
 class FitnessRule(Protocol):
     """Turns outcomes into fitness."""
 
-    initial: float
+    @property
+    def initial(self) -> float:
+        """Fitness before the first game."""
 
     def rated(self, fitness: Floats, outcomes: Outcomes) -> Floats:
         """Returns (N,) fitness after the games of ``outcomes``, taken one after the other."""

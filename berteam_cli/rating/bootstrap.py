@@ -287,4 +287,5 @@ def rank_intervals(samples: Floats) -> tuple[Ints, Ints]:
     ranks = np.argsort(np.argsort(-samples, axis=1, kind="stable"), axis=1, kind="stable") + 1
     tail = 0.5 * (1.0 - CONFIDENCE)
     low = np.quantile(ranks, tail, axis=0, method="lower")
-    return low, np.quantile(ranks, 1.0 - tail, axis=0, method="higher")
+    high = np.quantile(ranks, 1.0 - tail, axis=0, method="higher")
+    return low.astype(np.int64), high.astype(np.int64)

@@ -26,7 +26,7 @@ LONGEST_STEP_NAT = 1.0  # farther away its parabola is not to be trusted
 ARRIVED_NAT = 1e-11
 
 
-def expected(strengths: Floats, others: Floats) -> Floats:
+def expected(strengths: Floats, others: Floats | float) -> Floats:
     """Returns the expected score of ``strengths`` against ``others``, nats, in [0, 1]; broadcasts."""
     return 0.5 * (1.0 + np.tanh(0.5 * (strengths - others)))
 

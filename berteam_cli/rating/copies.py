@@ -29,7 +29,7 @@ def game_draws(env: Env) -> bool:
 
 def chancy_teams(env: Env, policies: Policies, teams: Ints) -> Bools:
     """Returns (K,) whether games of (K, T) ``teams`` are left to chance, whoever the opponent is."""
-    return draws_actions(env, policies)[teams].any(axis=1) | game_draws(env)
+    return np.logical_or(draws_actions(env, policies)[teams].any(axis=1), game_draws(env))
 
 
 def clusters(env: Env, policies: Policies, lineups: Ints) -> Ints:

@@ -7,6 +7,7 @@ Without draws that is Bradley and Terry's model. One nu is taken for all games: 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -17,7 +18,7 @@ from berteam_cli.rating.elo import points
 
 FEWEST_DRAWS = 0.25  # that are taken to have happened, so that nu stays finite and positive
 FEWEST_DECIDED = 0.25  # likewise, between equals
-PRECISE = {"ftol": 1e-15, "gtol": 1e-8, "maxiter": 5000, "maxcor": 30}
+PRECISE: Any = {"ftol": 1e-15, "gtol": 1e-8, "maxiter": 5000, "maxcor": 30}
 
 
 @dataclass(frozen=True)

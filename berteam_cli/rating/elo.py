@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,13 +12,15 @@ from berteam_cli.outcomes import Floats
 POINTS_PER_NAT = 400 / math.log(10)  # 173.7: ten times the odds are 400 points
 MEAN_POINTS = 1000.0  # the fixed teams' mean
 
+Numbers = TypeVar("Numbers", float, Floats)
 
-def points(strength_nat: Floats | float) -> Floats | float:
+
+def points(strength_nat: Numbers) -> Numbers:
     """Returns Elo points of strengths in nats; 0 nat are MEAN_POINTS."""
     return MEAN_POINTS + POINTS_PER_NAT * strength_nat
 
 
-def nats(elo: Floats | float) -> Floats | float:
+def nats(elo: Numbers) -> Numbers:
     """Returns strengths in nats of Elo points; the inverse of ``points``."""
     return (elo - MEAN_POINTS) / POINTS_PER_NAT
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -59,7 +61,7 @@ def team_label(source: Source, team: str) -> str:
     return short(f"{team} {' + '.join(map(str, members))}" if members and all(members) else str(team), 34)
 
 
-def stacked(table: pd.DataFrame, key: str, names: dict, name: str, title: str, says: str, axis: str) -> Plot:
+def stacked(table: pd.DataFrame, key: str, names: dict[Any, str], name: str, title: str, says: str, axis: str) -> Plot:
     """Returns shares over the epochs as areas on top of each other, the largest at the end lowest."""
     epochs = np.sort(table.epoch.unique())
     epochs = epochs[kept(len(epochs))]

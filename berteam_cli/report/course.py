@@ -66,7 +66,7 @@ def selecting(source: Source) -> Plot:
     name, title = "selector", "How the selector learns"
     table = source.table("selector")
     there = [] if table is None else [x for x in SELECTOR if table[x].notna().any()]
-    if not there:
+    if table is None or not there:
         return Plot(name, title, "There is nothing in selector.csv yet: berteam train writes it.")
     figure, plots = panels(len(there), 0.8 + 1.3 * len(there))
     for k, (plot, column) in enumerate(zip(plots, there, strict=True)):

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -71,7 +71,7 @@ def styled() -> Iterator[None]:
     import matplotlib as mpl  # noqa: PLC0415 (an extra)
 
     pale, edge, ink = LIGHT["pale"], LIGHT["edge"], LIGHT["ink"]
-    style = {
+    style: dict[Any, Any] = {
         "svg.fonttype": "none",
         "svg.hashsalt": "berteam",
         "text.parse_math": False,
@@ -116,7 +116,8 @@ def panels(rows: int = 1, height_in: float = HEIGHT_IN) -> tuple[Figure, list[Ax
 def over_epochs(plot: Axes) -> None:
     """Makes the horizontal axis of a plot that of epochs, which are whole numbers."""
     plot.set_xlabel("epoch")
-    plot.xaxis.get_major_locator().set_params(integer=True)
+    ticks: Any = plot.xaxis.get_major_locator()  # matplotlib's own, which takes this
+    ticks.set_params(integer=True)
 
 
 def drawn(figure: Figure, name: str, title: str, says: str, alt: str) -> Plot:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -27,10 +29,11 @@ def aggression(source: Source) -> Plot:
     groups = {"defensive (below 1)": values[values < 1], "aggressive (1 and above)": values[values >= 1]}
     bins = np.arange(0, max(values.max(), 1.0) + 2 * BIN, BIN)  # 1 is the border of two of them
     for (label, group), color in zip(groups.items(), SERIES[:2], strict=True):
-        plot.hist(group, bins=bins, color=color, label=f"{label}: {len(group)}", edgecolor=LIGHT["card"])
+        plot.hist(group, bins=bins.tolist(), color=color, label=f"{label}: {len(group)}", edgecolor=LIGHT["card"])
     plot.axvline(1, color=LIGHT["pale"], linewidth=1, linestyle=":")
     plot.set(xlabel="aggression (0 keeps home, 1 between, above attacks)", ylabel="members")
-    plot.yaxis.get_major_locator().set_params(integer=True)
+    ticks: Any = plot.yaxis.get_major_locator()  # matplotlib's own, which takes this
+    ticks.set_params(integer=True)
     plot.legend()
     says = (
         f"{len(values)} members by what a team made only of each one did against the fixed teams. The border at 1 is "
@@ -68,7 +71,7 @@ def fitness(source: Source) -> Plot:
         marks = replaced.iloc[kept(len(replaced), MARKS)]
         plot.plot(
             *(marks.epoch, marks.removed_fitness, "x"),
-            **{"color": SERIES[3], "markersize": 4, "alpha": 0.7, "label": f"replaced ({len(replaced):,})"},
+            **dict[str, Any](color=SERIES[3], markersize=4, alpha=0.7, label=f"replaced ({len(replaced):,})"),
         )
     scores = wide.max().max() <= 1
     over_epochs(plot)

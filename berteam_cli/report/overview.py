@@ -34,9 +34,11 @@ def headline(source: Source) -> dict[str, str]:
         facts["Expected Elo"] = spread(row.expected_elo, row.expected_elo_low, row.expected_elo_high)
     figures = source.evaluated("figures")
     if figures is not None:
-        for row in figures.itertuples():
-            low, high = getattr(row, "low", math.nan), getattr(row, "high", math.nan)
-            facts[str(row.quantity).replace("_", " ").capitalize().replace("elo", "Elo")] = spread(row.value, low, high)
+        figure: Any  # a row, whose fields are the columns
+        for figure in figures.itertuples():
+            low, high = getattr(figure, "low", math.nan), getattr(figure, "high", math.nan)
+            named = str(figure.quantity).replace("_", " ").capitalize().replace("elo", "Elo")
+            facts[named] = spread(figure.value, low, high)
     if source.elo is not None:
         best = source.elo.iloc[0]
         facts["Best team"] = f"{best.team} ({best.members})"

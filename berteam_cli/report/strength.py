@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -49,7 +51,7 @@ def against_probability(source: Source) -> Plot:
     explained = np.corrcoef(elo, chance)[0, 1] ** 2 if chance.std() > 0 else 0.0
     dots = kept(len(elo), DOTS)
     figure, (plot,) = panels()
-    look = {"alpha": 0.85, "markersize": 5} if len(dots) < FEW else {"alpha": 0.5, "markersize": 3.5}
+    look: dict[str, Any] = {"alpha": 0.85, "markersize": 5} if len(dots) < FEW else {"alpha": 0.5, "markersize": 3.5}
     plot.plot(elo[dots], 10 ** chance[dots], "o", color=SERIES[0], markeredgewidth=0, **look)
     ends = np.array([elo.min(), elo.max()])
     plot.plot(ends, 10 ** (foot + slope * ends), color=SERIES[3], linewidth=1.8)

@@ -96,9 +96,20 @@ class Selecting:
 class Plain:
     """What holds of selectors that say nothing else: they neither look at games nor answer them."""
 
-    observes = False
-    answers = False
-    by_side = False
+    @property
+    def observes(self) -> bool:
+        """Returns False: it does not look at games."""
+        return False
+
+    @property
+    def answers(self) -> bool:
+        """Returns False: it chooses each team by itself."""
+        return False
+
+    @property
+    def by_side(self) -> bool:
+        """Returns False: a team's chance is the same on every side."""
+        return False
 
     def lists(self, state: Any) -> bool:
         """Returns False: it chooses from all teams there can be."""
@@ -110,21 +121,29 @@ class Plain:
 
 
 class Selector(Protocol[S]):
-    """Chooses who plays together; keeps settings only, all that it learns is in ``S``.
+    """Chooses who plays together; keeps settings only, all that it learns is in ``S``."""
 
-    Attributes:
-        field: among whom it chooses.
-        observes: whether ``learn`` wants to know what the players saw.
-        answers: whether every second game of an epoch is against the opponents of the one before, with a team that
-            ``answer`` chooses on what was seen of them.
-        by_side: whether a team's chance depends on the side it plays; then ``sample`` and ``distribution`` take a
-            ``side``, and without one mean a team for each side in turn.
-    """
+    @property
+    def field(self) -> Field:
+        """Among whom it chooses."""
 
-    field: Field
-    observes: bool
-    answers: bool
-    by_side: bool
+    @property
+    def observes(self) -> bool:
+        """Whether ``learn`` wants to know what the players saw."""
+
+    @property
+    def answers(self) -> bool:
+        """Whether every second game of an epoch is against the opponents of the one before.
+
+        The team for it is chosen by ``answer``, on what was seen of them.
+        """
+
+    @property
+    def by_side(self) -> bool:
+        """Whether a team's chance depends on the side it plays.
+
+        Then ``sample`` and ``distribution`` take a ``side``, and without one mean a team for each side in turn.
+        """
 
     def init(self, rng: Generator) -> S:
         """Returns the state before the first game."""

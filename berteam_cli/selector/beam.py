@@ -73,7 +73,9 @@ def grown(odds: Odds, teams: Ints, reach: Floats, source: int, width: int, *, me
     after = teams[row]
     after[np.arange(len(after)), place] = member
     unique, which = np.unique(np.sort(after, axis=1) if merged else after, axis=0, return_inverse=True)
-    reached = np.bincount(which.reshape(-1), weights=flow[row, place, member], minlength=len(unique))
+    sent = flow[row, place, member]
+    # numpy's types forget the weights.
+    reached: Floats = np.bincount(which.reshape(-1), weights=sent, minlength=len(unique))  # type: ignore[assignment]
     kept = np.argsort(-reached, kind="stable")[:width]
     kept = kept[reached[kept] > 0]
     return unique[kept], reached[kept]

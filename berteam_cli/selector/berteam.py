@@ -102,7 +102,8 @@ class Berteam(BerteamLearning):
         sides = self._sides(side)
         odds = self._own(self._odds(state, sides))
         chances = sum(
-            total_distribution(odds, self.field, k, exchangeable=self._exchangeable) for k in range(len(sides))
+            (total_distribution(odds, self.field, k, exchangeable=self._exchangeable) for k in range(len(sides))),
+            start=np.zeros(1),
         )
         teams = unordered_teams(self.field.members, self.field.team_size)
         possible = chances > 0

@@ -67,8 +67,11 @@ def attended(attention: nn.MultiheadAttention, x: Tensor, memory: Tensor, absent
         keys, values = functional.linear(memory, weights[width:], biases[width:]).chunk(2, dim=-1)
         if len(memory) == 1:
             queries = queries.reshape(1, -1, width)  # all that ask the same memory ask it together
+    queries, keys, values = (part.unflatten(-1, (heads, -1)).transpose(1, 2) for part in (queries, keys, values))
     mixed = functional.scaled_dot_product_attention(
-        *(part.unflatten(-1, (heads, -1)).transpose(1, 2) for part in (queries, keys, values)),
+        queries,
+        keys,
+        values,
         attn_mask=None if absent is None else ~absent[:, None, None],
         dropout_p=attention.dropout if attention.training else 0.0,
     )
@@ -93,7 +96,7 @@ def encoded(encoder: nn.TransformerEncoder, x: Tensor, absent: Tensor | None = N
     for layer in encoder.layers:
         x = layer.norm1(x + passed(layer.dropout1, attended(layer.self_attn, x, x, absent)))
         x = layer.norm2(x + passed(layer.dropout2, fed(layer, x)))
-    return encoder.norm(x)
+    return x if encoder.norm is None else encoder.norm(x)
 
 
 def decoded(
@@ -121,7 +124,7 @@ def decoded(
         x = layer.norm1(x + passed(layer.dropout1, attended(layer.self_attn, x, everything, absent)))
         x = layer.norm2(x + passed(layer.dropout2, attended(layer.multihead_attn, x, memory, memory_absent)))
         x = layer.norm3(x + passed(layer.dropout3, fed(layer, x)))
-    return decoder.norm(x)
+    return x if decoder.norm is None else decoder.norm(x)
 
 
 def fed(layer: nn.TransformerEncoderLayer | nn.TransformerDecoderLayer, x: Tensor) -> Tensor:

@@ -92,7 +92,9 @@ class Listed(Plain):
         if will is None:
             return independent.anybody(self.field).mean(axis=0)
         weights = np.repeat(will.probability / self.field.team_size, self.field.team_size)
-        return np.bincount(will.teams.ravel(), weights=weights, minlength=self.field.members)
+        # numpy's types forget the weights.
+        chances: Floats = np.bincount(will.teams.ravel(), weights=weights, minlength=self.field.members)  # type: ignore[assignment]
+        return chances
 
     def drawn_games(self, state: Any, games: int, rng: Generator) -> Lineups:
         """Returns ``games`` training games between teams of its own will, and random ones."""

@@ -6,8 +6,10 @@ Paper, Section 3, "Training Procedure"; the masks are those of BERT.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from numpy.random import Generator
 from torch import Tensor
@@ -90,9 +92,9 @@ def masking_loss(
         rng: the only source of chance.
     """
     shown, hidden = masked(examples.teams, members, rng)
-    seen = (None, None)
+    seen: tuple[npt.NDArray[Any] | None, npt.NDArray[Any] | None] = (None, None)
     if examples.rows.shape[2]:
         seen = (examples.rows, forgotten(examples.lengths, drop_input, drop_player, rng))
     logits = network(shown, examples.sides, *seen)
-    teams, hidden, weights = (torch.from_numpy(x).to(logits.device) for x in (examples.teams, hidden, examples.weights))
-    return guessing_loss(logits, teams, hidden, weights.float())
+    teams, asked, weights = (torch.from_numpy(x).to(logits.device) for x in (examples.teams, hidden, examples.weights))
+    return guessing_loss(logits, teams, asked, weights.float())

@@ -140,8 +140,11 @@ class Mcaa(Plain):
 
     def _of_the_best(self, tally: Tally, islands: int) -> Floats:
         """Returns (I,) the members of each island in the best of the teams that played."""
+        assert self.top_fraction is not None, "no teams are ranked"
         weights = np.repeat(top_weights(tally.mean, self.top_fraction), self.field.team_size)
-        return np.bincount(self.field.island_of[tally.teams.ravel()], weights=weights, minlength=islands)
+        places = self.field.island_of[tally.teams.ravel()]
+        # numpy's types forget the weights.
+        return np.bincount(places, weights=weights, minlength=islands)  # type: ignore[return-value]
 
     def _chances(self, state: McaaState) -> Floats:
         """Returns (T, N) the chance of each member at each place, in proportion to its island's share."""

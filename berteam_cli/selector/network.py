@@ -121,6 +121,8 @@ class Reader(nn.Module):
 class Writer(nn.Module):
     """Completes teams, attending to the memory that the reader made."""
 
+    places: Tensor
+
     def __init__(
         self,
         members: int,

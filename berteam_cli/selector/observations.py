@@ -60,7 +60,7 @@ class Seen:
     rows: npt.NDArray[np.float16]
     lengths: Ints
 
-    def __getitem__(self, which: object) -> Seen:
+    def __getitem__(self, which: Any) -> Seen:
         """Returns that of some of the teams."""
         return Seen(self.rows[which], self.lengths[which])
 

@@ -52,7 +52,8 @@ class Tally:
         games = np.concatenate([self.games, np.ones(len(played), dtype=np.int64)])
         return Tally(
             teams,
-            np.bincount(which, weights=points, minlength=len(teams)),
+            # numpy's types forget the weights.
+            np.bincount(which, weights=points, minlength=len(teams)),  # type: ignore[arg-type]
             np.rint(np.bincount(which, weights=games, minlength=len(teams))).astype(np.int64),
         )
 

@@ -25,6 +25,8 @@ def env(reward: Any = "custom_rew2", **given: Any) -> "OrderedEnv":
 class TurnsEnv(parallel_to_aec_wrapper[str, Any, Any]):
     """PettingZoo's conversion, but an action is refused when it is given, not in the turn of the last agent."""
 
+    env: MctfEnv
+
     def step(self, action: Any) -> None:
         """Takes the action of ``agent_selection``; None of one whose game is over.
 

@@ -163,7 +163,7 @@ class Batch:
         else:
             np.add(given, view.first_action, out=lanes.actions, casting="unsafe")
 
-    def _refuse(self, given: NDArray, good: NDArray[np.bool_]) -> None:
+    def _refuse(self, given: NDArray[Any], good: NDArray[np.bool_]) -> None:
         """Raises for the first action that is not ``good`` (B, V), unless its lane has no game."""
         bad = np.argwhere(~good & (self._lanes.game != NO_GAME)[:, np.newaxis])
         if len(bad):

@@ -83,14 +83,13 @@ def _of_episodes(report: Report) -> Iterator[str]:
             )
     for number, episode in enumerate(episodes):
         if episode.first is not None:
-            yield _of_episode(number, episode)
+            yield _of_episode(number, episode, episode.first)
     if report.differing_share > FLIP_SHARE:
         share = f"{report.differing_share:.2%}, allowed {FLIP_SHARE:.0%}"
         yield f"too many agent-steps differ with keep-out contact: {share}"
 
 
-def _of_episode(number: int, episode: Episode) -> str:
-    found = episode.first
+def _of_episode(number: int, episode: Episode, found: Mismatch) -> str:
     verdict = "differs within what is allowed"
     if not episode.as_recorded:
         cause = (

@@ -1,7 +1,7 @@
 """Compares recorded games with what the kernel makes of them, number by number and episode by episode."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +154,7 @@ def _with_episode(report: Report, recording: Recording, episode: int) -> Report:
 
 
 def _compared(
-    recorded: dict[str, NDArray], computed: dict[str, NDArray], kept_out: NDArray[np.bool_], first_row: int
+    recorded: dict[str, NDArray[Any]], computed: dict[str, NDArray[Any]], kept_out: NDArray[np.bool_], first_row: int
 ) -> Episode:
     """Returns how an episode from its start compares with its recording; ``kept_out`` (L, V) are the contacts."""
     vehicles = kept_out.shape[1]
@@ -180,13 +180,13 @@ def _compared(
     )
 
 
-def _captures(fields: dict[str, NDArray]) -> tuple[int, int]:
+def _captures(fields: dict[str, NDArray[Any]]) -> tuple[int, int]:
     blue, red = fields["score"][-1, :, CAPTURES].tolist()
     return blue, red
 
 
 def _mismatches(
-    name: str, wrong: NDArray[np.bool_], recorded: NDArray, computed: NDArray, first_row: int
+    name: str, wrong: NDArray[np.bool_], recorded: NDArray[Any], computed: NDArray[Any], first_row: int
 ) -> list[Mismatch]:
     return [
         Mismatch(first_row + index[0], name, index[1:], float(recorded[index]), float(computed[index]))
@@ -194,7 +194,7 @@ def _mismatches(
     ]
 
 
-def _apart(name: str, computed: NDArray, recorded: NDArray) -> NDArray[np.float64]:
+def _apart(name: str, computed: NDArray[Any], recorded: NDArray[Any]) -> NDArray[np.float64]:
     """Returns the differences of a field; NaN counts as infinitely far, and a turn more as none in its range."""
     recorded = np.asarray(recorded, np.float64)
     apart = np.abs(np.asarray(computed, np.float64) - recorded)

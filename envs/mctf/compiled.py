@@ -8,12 +8,31 @@ thirty that a state consists of whenever it branches, which took four fifths of 
 those thirty on at each call.
 """
 
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
 from numba import njit
 
-kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True)
+if TYPE_CHECKING:
+    from numba.core.dispatcher import Dispatcher
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+
+class Compiler(Protocol):
+    """A decorator whose compiled function is called like the plain one."""
+
+    def __call__(self, function: Function, /) -> "Dispatcher[Function]":
+        """Returns the function, to be compiled when it is first called."""
+
+
+# Numba's types leave out the options that only its documents and sources name (_nrt, no_cpython_wrapper).
+kernel: Compiler = njit(  # type: ignore[call-overload]
+    cache=True, nogil=True, error_model="numpy", _nrt=False, forceinline=True
+)
 """For functions that Python calls, or other compiled functions."""
 
-part = njit(
+part: Compiler = njit(  # type: ignore[call-overload]
     cache=True,
     nogil=True,
     error_model="numpy",

@@ -1,7 +1,7 @@
 """A whole game as frames and events, played again from its actions; what pictures are drawn from."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -140,7 +140,7 @@ def filmed(actions: ArrayLike, rules: Rules, seed: int = 0) -> Film:
         shots.append(_shot(state))
         events += _events(number, state.events[0] - before, state.tagged_opponent[0])
     arrays = (np.stack(column) for column in zip(*shots, strict=True))
-    return Film(*arrays, tuple(events), rules, finished(state, 0, rules))
+    return Film._make((*arrays, tuple(events), rules, finished(state, 0, rules)))
 
 
 def film_of_policies(policies: Sequence[int], rules: Rules, seed: int = 0) -> Film:
@@ -182,7 +182,7 @@ def _checked(actions: ArrayLike, rules: Rules) -> NDArray[np.int64]:
     return np.ascontiguousarray(given, dtype=np.int64)
 
 
-def _shot(state: State) -> tuple[NDArray, ...]:
+def _shot(state: State) -> tuple[NDArray[Any], ...]:
     return tuple(getattr(state, name)[0].copy() for name in ARRAYS)
 
 

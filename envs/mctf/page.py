@@ -78,6 +78,6 @@ def _told(film: Film, names: Sequence[str], title: str) -> dict[str, Any]:
     }
 
 
-def _steps(values: NDArray) -> list[int]:
+def _steps(values: NDArray[Any]) -> list[int]:
     whole = np.rint(values).astype(np.int64).reshape(len(values), -1)
     return np.diff(whole, axis=0, prepend=np.zeros_like(whole[:1])).ravel().tolist()

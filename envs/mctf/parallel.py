@@ -1,7 +1,7 @@
 """The game as a PettingZoo environment in which all act at once: names, spaces and checks around one lane."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete
@@ -27,7 +27,7 @@ def parallel_env(reward: Any = "custom_rew2", **given: Any) -> "MctfEnv":
     return MctfEnv(reward, **given)
 
 
-class MctfEnv(ParallelEnv[str, NDArray[np.float32], Any]):
+class MctfEnv(ParallelEnv[str, Any, Any]):
     """One game of Capture-the-Flag. Agents are blue_0.. and red_0..; all act in every step.
 
     Actions are for ``"discrete"`` 0..7 full speed, 8..15 half speed, both with the turns 180, 135, .. -135 deg, and 16
@@ -48,7 +48,7 @@ class MctfEnv(ParallelEnv[str, NDArray[np.float32], Any]):
         render_mode: as given.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]  # PettingZoo means the class's, too
         "name": "mctf_v0",
         "render_modes": ["human", "rgb_array", "ansi"],
         "is_parallelizable": True,
@@ -116,11 +116,11 @@ class MctfEnv(ParallelEnv[str, NDArray[np.float32], Any]):
 
     def observation_space(self, agent: str) -> Box:
         """Returns the space of the agent's observations, always the same object."""
-        return self.observation_spaces[agent]
+        return cast("Box", self.observation_spaces[agent])
 
     def action_space(self, agent: str) -> Box | Discrete:
         """Returns the space of the agent's actions, always the same object, as its seed is kept in it."""
-        return self.action_spaces[agent]
+        return cast("Box | Discrete", self.action_spaces[agent])
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Observations, Infos]:
         """Starts a game and returns first observations and infos.
@@ -266,7 +266,8 @@ class MctfEnv(ParallelEnv[str, NDArray[np.float32], Any]):
             return render.frame(self._lanes.state, 0, self.rules)
         if self.render_mode == "ansi":
             return render.text(self._lanes.state, 0, self.rules)
-        self._window.show(self._lanes.state, 0)
+        if self._window is not None:  # it is there in the one mode that is left, "human"
+            self._window.show(self._lanes.state, 0)
         return None
 
     def close(self) -> None:

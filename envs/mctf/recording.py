@@ -89,7 +89,7 @@ class TraceError(ValueError):
 class Recording(NamedTuple):
     """Recorded games: arrays of all rows, where episodes start and end, names of policies, rules of the episodes."""
 
-    arrays: dict[str, NDArray]
+    arrays: dict[str, NDArray[Any]]
     starts: NDArray[np.int64]
     ends: NDArray[np.int64]
     policies: list[str]
@@ -99,7 +99,7 @@ class Recording(NamedTuple):
         """Returns the row with the start of an episode."""
         return int(self.starts[episode])
 
-    def of(self, episode: int) -> dict[str, NDArray]:
+    def of(self, episode: int) -> dict[str, NDArray[Any]]:
         """Returns the rows of an episode, of every array."""
         rows = slice(int(self.starts[episode]), int(self.ends[episode]))
         return {name: array[rows] for name, array in self.arrays.items()}
@@ -133,7 +133,7 @@ def read(path: Path) -> Recording:
     return Recording(arrays, starts, ends, meta["policies"], rules)
 
 
-def _loaded(path: Path) -> dict[str, NDArray]:
+def _loaded(path: Path) -> dict[str, NDArray[Any]]:
     try:
         if path.is_file() and path.stat().st_size == 0:
             raise TraceError(f"is empty; {EXPECTED}")
@@ -150,10 +150,10 @@ def _loaded(path: Path) -> dict[str, NDArray]:
         raise TraceError(f"is no npz archive of arrays, or is cut off or damaged; {EXPECTED}") from error
 
 
-def _meta(text: NDArray) -> dict[str, Any]:
+def _meta(text: NDArray[Any]) -> dict[str, Any]:
     try:
         meta = json.loads(str(text))
-        settings = {name: _number(name, meta[name]) for name in NUMBERS}
+        settings: dict[str, Any] = {name: _number(name, meta[name]) for name in NUMBERS}
         settings |= {name: meta[name] if isinstance(meta[name], str) else _number(name, meta[name]) for name in TEXTS}
         settings |= {"world_size": [_number("world_size", extent) for extent in meta["world_size"]]}
         settings |= {"policies": [str(name) for name in meta["policies"]], "reward": meta["reward"]}
@@ -175,7 +175,7 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
-def _check_arrays(arrays: dict[str, NDArray], vehicles: int, policies: int) -> None:
+def _check_arrays(arrays: dict[str, NDArray[Any]], vehicles: int, policies: int) -> None:
     sizes = {V: vehicles, T: 13 + 8 * vehicles}
     rows = arrays["episode"].size
     if rows == 0:
@@ -199,7 +199,7 @@ def _check_arrays(arrays: dict[str, NDArray], vehicles: int, policies: int) -> N
             raise TraceError(f"has entries of {name} in {least}..{most}; they must be in {low}..{high}.")
 
 
-def _episodes(arrays: dict[str, NDArray]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _episodes(arrays: dict[str, NDArray[Any]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Returns where the episodes start and end; one has a start and at least one step."""
     steps = arrays["episode_step"]
     starts = np.flatnonzero(steps == 0)
@@ -222,7 +222,7 @@ def _episodes(arrays: dict[str, NDArray]) -> tuple[NDArray[np.int64], NDArray[np
     return starts, ends
 
 
-def _check_clock(meta: dict[str, Any], arrays: dict[str, NDArray]) -> None:
+def _check_clock(meta: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
     """Refuses settings that make the steps longer or shorter than they were, before that many sub-steps are played."""
     of_step = np.diff(arrays["time"])[arrays["episode_step"][1:] > 0]
     recorded, told = float(np.median(of_step)), meta["sim_speedup_factor"] * meta["tau"]
@@ -233,7 +233,7 @@ def _check_clock(meta: dict[str, Any], arrays: dict[str, NDArray]) -> None:
         )
 
 
-def _rules(meta: dict[str, Any], arrays: dict[str, NDArray], rows: slice) -> Rules:
+def _rules(meta: dict[str, Any], arrays: dict[str, NDArray[Any]], rows: slice) -> Rules:
     last = rows.stop - 1
     score = int(arrays["score"][last, :, 0].max()) if arrays["terminated"][last] else None
     try:

@@ -9,7 +9,7 @@ import os
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from PIL import Image
 from mctf.film import TEAM_NAMES, Film, home, is_right, number_of, said, team_of
 from mctf.rules import BLUE, RED, Rules
 from mctf.sheet import Color, Sheet
-from mctf.state import CAPTURES, GRABS, TAGS
+from mctf.state import CAPTURES, GRABS, TAGS, State
 
 FRAMES_PER_SECOND = 10
 """Of windows and of the environment's pictures."""
@@ -34,17 +34,8 @@ GIF_FRAMES = 150
 WAKE_S = 15.0
 
 
-class Rows(Protocol):
-    """Fields of ``State`` and ``Film`` that are drawn; described there."""
-
-    pos: NDArray[np.float64]
-    heading: NDArray[np.float64]
-    has_flag: NDArray[np.bool_]
-    on_own_side: NDArray[np.bool_]
-    is_tagged: NDArray[np.bool_]
-    cooldown: NDArray[np.float64]
-    score: NDArray[np.int64]
-    time: NDArray[np.float64]
+Rows: TypeAlias = State | Film
+"""What is drawn: games or frames."""
 
 
 def clock(seconds: float) -> str:
@@ -54,7 +45,7 @@ def clock(seconds: float) -> str:
 
 
 def frame(
-    rows: Rows, b: int, rules: Rules, width: int = 800, caption: str | None = None, trail: NDArray | None = None
+    rows: Rows, b: int, rules: Rules, width: int = 800, caption: str | None = None, trail: NDArray[Any] | None = None
 ) -> NDArray[np.uint8]:
     """Returns a picture of one moment, (H, width, 3) RGB.
 
@@ -179,7 +170,7 @@ def text(rows: Rows, b: int, rules: Rules) -> str:
     lines = max(8, round(columns / 2 * rules.height_m / rules.width_m))
     grid = [[" "] * columns for _ in range(lines)]
 
-    def put(x: float, y: float, words: str) -> None:
+    def put(words: str, x: float, y: float) -> None:
         line = min(max(int((1.0 - y / rules.height_m) * lines), 0), lines - 1)
         start = min(max(round(x / rules.width_m * columns) - len(words) // 2, 0), columns - len(words))
         grid[line][start : start + len(words)] = words
@@ -189,12 +180,12 @@ def text(rows: Rows, b: int, rules: Rules) -> str:
     vehicles = range(rows.pos.shape[1])
     for team in (BLUE, RED):
         if not any(rows.has_flag[b, v] and team_of(v, rules) != team for v in vehicles):
-            put(*home(team, rules), f"[{TEAM_NAMES[team][0].upper()}]")
+            put(f"[{TEAM_NAMES[team][0].upper()}]", *home(team, rules))
     for v in vehicles:
         team = team_of(v, rules)
         pointing = "^>v<"[round(rows.heading[b, v] / 90.0) % 4]
         mark = "x" if rows.is_tagged[b, v] else "*" if rows.has_flag[b, v] else pointing
-        put(*rows.pos[b, v], f"{TEAM_NAMES[team][0]}{number_of(v, rules)}{mark}")
+        put(f"{TEAM_NAMES[team][0]}{number_of(v, rules)}{mark}", *rows.pos[b, v])
     scores = ", ".join(
         f"{name} {rows.score[b, team, CAPTURES]} (grabs {rows.score[b, team, GRABS]}, tags {rows.score[b, team, TAGS]})"
         for team, name in enumerate(TEAM_NAMES)
@@ -250,7 +241,8 @@ class Window:
                 "render_mode='human' needs pygame, which is not there: pip install 'berteam-cli[human]'."
             ) from error
         self._pygame, self._rules, self._width = pygame, rules, width
-        self._screen, self._closed = None, False
+        self._screen: pygame.Surface | None = None
+        self._closed = False
         self._pace = pygame.time.Clock()
 
     def show(self, rows: Rows, b: int) -> None:

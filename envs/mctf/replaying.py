@@ -1,6 +1,6 @@
 """Plays recorded episodes again: every step from its recorded state, and whole episodes from their start alone."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ class Stepped(NamedTuple):
         kept_out: (L, V) the vehicle touches the keep-out circle in the step that leads away from the row.
     """
 
-    fields: dict[str, NDArray]
+    fields: dict[str, NDArray[Any]]
     choices: int
     kept_out: NDArray[np.bool_]
 
@@ -52,7 +52,7 @@ def stepped(recording: Recording, episode: int) -> Stepped:
     chosen = np.full((length, vehicles), -1)
     policies = _policies(recorded["policy"][0], recording.policies)
     choose_each(state, policies, rules, raw, chosen)
-    unbounded = State(*(array.copy() for array in state))
+    unbounded = State._make(array.copy() for array in state)
     step_each(state, actions, rules)
     step_each(unbounded, actions, rules._replace(flag_keepout_m=0.0))
     seen = np.zeros((length, *raw.shape), np.float32)
@@ -67,7 +67,7 @@ def stepped(recording: Recording, episode: int) -> Stepped:
     return Stepped(fields, int((chosen >= 0).sum()), kept_out)
 
 
-def replayed(recording: Recording, episode: int, names: tuple[str, ...]) -> dict[str, NDArray]:
+def replayed(recording: Recording, episode: int, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     """Returns (L, ...) the fields ``names`` of an episode that was played from its start with the recorded actions."""
     actions, rules = recording.of(episode)["action"].astype(np.int64), recording.rules[episode]
     state, ends = _started(recording, episode, 1), np.zeros(len(actions), np.int64)
@@ -95,7 +95,7 @@ def _policies(numbers: NDArray[np.int8], names: list[str]) -> NDArray[np.int64]:
     return np.array([known[number] for number in numbers], np.int64)
 
 
-def _over(ends: NDArray[np.int64]) -> dict[str, NDArray]:
+def _over(ends: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
     """Returns what the original calls the ends of ``finished``."""
     return {"terminated": (ends != RUNNING) & (ends != TIME_OUT), "truncated": ends == TIME_OUT}
 

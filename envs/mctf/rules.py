@@ -256,7 +256,7 @@ def _sizes(team_size: Any) -> tuple[int, int]:
     given = team_size if hasattr(team_size, "__len__") and not isinstance(team_size, str) else (team_size, team_size)
     if len(given) != 2:
         raise ValueError(f"team_size must be one number or two, of blue and of red, but is {team_size!r}.")
-    sizes = tuple(_count("team_size", size) for size in given)
+    sizes = _count("team_size", given[0]), _count("team_size", given[1])
     if max(sizes) > LARGEST_TEAM:
         raise ValueError(f"team_size must be at most {LARGEST_TEAM}, but is {max(sizes)}.")
     return sizes

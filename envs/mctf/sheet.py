@@ -73,7 +73,7 @@ class Sheet:
     def write(self, where: Point, words: str, size: float, color: Color, anchor: str) -> float:
         """Writes words; returns how wide they are. In pixels; anchors as of Pillow."""
         font = _font(round(SHARPNESS * size))
-        self.draw.text([SHARPNESS * value for value in where], words, color, font, anchor=anchor)
+        self.draw.text((SHARPNESS * where[0], SHARPNESS * where[1]), words, color, font, anchor=anchor)
         return self.draw.textlength(words, font) / SHARPNESS
 
     def array(self) -> NDArray[np.uint8]:

@@ -3,7 +3,7 @@
 Shape letters: B games, V vehicles (blue first, then red), 2 teams (blue, red).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,7 @@ class State(NamedTuple):
 def empty(games: int, rules: Rules) -> State:
     """Returns zeros for ``games`` games; ``reset`` makes a game of each."""
     b, v = games, rules.blue_size + rules.red_size
-    floats = {
+    floats: dict[str, tuple[int, ...]] = {
         "pos": (b, v, 2),
         "prev_pos": (b, v, 2),
         "speed": (b, v),
@@ -151,10 +151,11 @@ def empty(games: int, rules: Rules) -> State:
         "was_tagged",
     )
     of_teams = ("flag_taken", "pickup", "capture", "was_pickup", "was_capture")
+    arrays: dict[str, NDArray[Any]] = {name: np.zeros(shape) for name, shape in floats.items()}
+    arrays |= {name: np.zeros((b, v), np.bool_) for name in of_vehicles}
+    arrays |= {name: np.zeros((b, 2), np.bool_) for name in of_teams}
     return State(
-        **{name: np.zeros(shape) for name, shape in floats.items()},
-        **{name: np.zeros((b, v), np.bool_) for name in of_vehicles},
-        **{name: np.zeros((b, 2), np.bool_) for name in of_teams},
+        **arrays,
         tagged_opponent=np.full((b, v), -1, np.int64),
         score=np.zeros((b, 2, 3), np.int64),
         steps=np.zeros(b, np.int64),
