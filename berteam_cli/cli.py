@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from berteam_cli import __version__
-from berteam_cli.errors import InputError, RunError, did_you_mean
+from berteam_cli.errors import InputError, RunError, did_you_mean, sentence
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -177,7 +177,7 @@ def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) 
 
 def refuse(error: InputError | RunError) -> NoReturn:
     """Says what is wrong and exits with the error's code."""
-    print(f"berteam: {error}", file=sys.stderr)
+    print(f"berteam: {sentence(error)}", file=sys.stderr)
     raise SystemExit(error.code) from None
 
 
@@ -257,13 +257,14 @@ def inspect(word: str, words: list[str]) -> None:
         word,
         words,
         run={"type": Path, "help": "folder of the run"},
+        overrides={"nargs": "*", "help": "trust=MODULE:FUNCTION, code that the run's game may import"},
         __top={"type": int, "default": 10, "help": "rows of each table"},
     )
     if given.top < 1:
         raise InputError(f"--top must be >= 1, but is {given.top}.")
     from berteam_cli.command.inspect import inspect as look  # noqa: PLC0415
 
-    look(given.run, given.top)
+    look(given.run, given.top, given.overrides)
 
 
 def listing(word: str, words: list[str]) -> None:

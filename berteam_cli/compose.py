@@ -212,8 +212,8 @@ def check_choice(override: Override, searched: list[str]) -> None:
     value = override.value()
     given = value.list if isinstance(value, ChoiceSweep) else [value]
     for item in given:
-        text = str(getattr(item, "text", item))
-        if item is not None and text not in allowed:
+        text = "null" if item is None else str(getattr(item, "text", item))
+        if text not in allowed:
             raise InputError.choice(group, text, allowed)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,11 @@ from berteam_cli.config_commands import TrainConfig
 from berteam_cli.config_groups import IslandConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import CONFIG, Manifest, claim
+from berteam_cli.trust import check_trusted
 
 MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation", "logger")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
+LARGEST = 2**24  # bytes of a config; usual are three thousand
 PLACE = ("out", "on_exists")
 """Keys that say where a run goes, not what it does."""
 
@@ -32,25 +35,52 @@ def write_config(folder: Path, text: str) -> None:
 
 
 def plain_config(folder: Path) -> DictConfig:
-    """Returns the config of the run in ``folder`` as it stands there.
+    """Returns the config of the run in ``folder`` as it stands there: values, and nothing that stands for others.
 
     Raises:
         InputError: it cannot be read.
     """
     try:
-        config = OmegaConf.load(folder / CONFIG)
-    except (OSError, ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
-        raise InputError(f"{folder / CONFIG} cannot be read: {str(error).splitlines()[0]}.") from error
+        config = OmegaConf.create(plain_yaml(folder / CONFIG))
+    except (OSError, ValueError, RecursionError, yaml.YAMLError, OmegaConfBaseException) as error:
+        raise InputError(f"{folder / CONFIG} cannot be read: {first_line(error)}.") from error
     if not isinstance(config, DictConfig):
         raise InputError(f"{folder / CONFIG} cannot be read: it holds no keys.")
     return config
 
 
-def stored_config(folder: Path) -> DictConfig:
-    """Returns the config of the training run in ``folder``, with its schemas.
+def plain_yaml(path: Path) -> str:
+    """Returns the text of a yaml file that holds values only, as a run writes it.
 
     Raises:
-        InputError: it cannot be read, is not a training's or another version's.
+        OSError: it cannot be read.
+        ValueError: it has tags, which may stand for objects, interpolations, which may stand for anything on this
+            machine, or aliases, which a few lines may make millions of; or is no yaml, or too large.
+    """
+    if path.stat().st_size > LARGEST:
+        raise ValueError(f"it has more than {LARGEST >> 20} MiB")
+    text = path.read_text(encoding="utf-8")
+    for token in yaml.scan(text, Loader=yaml.SafeLoader):
+        said = token.value if isinstance(token, yaml.ScalarToken) else ""
+        if isinstance(token, yaml.TagToken | yaml.AnchorToken | yaml.AliasToken) or "${" in said:
+            raise ValueError(f"line {token.start_mark.line + 1} has a tag, an alias or an interpolation, and no value")
+    return text
+
+
+def first_line(error: Exception) -> str:
+    """Returns the first line of what an error says, or of what kind it is."""
+    return f"{error}".partition("\n")[0].rstrip(".") or type(error).__name__
+
+
+def stored_config(folder: Path, trust: Collection[str] = ()) -> DictConfig:
+    """Returns the config of the training run in ``folder``, with its schemas.
+
+    Args:
+        folder: of the run.
+        trust: what the run's game may import.
+
+    Raises:
+        InputError: it cannot be read, is not a training's or another version's, or imports something else.
     """
     check_schema(folder)
     plain = plain_config(folder)
@@ -64,10 +94,13 @@ def stored_config(folder: Path) -> DictConfig:
         for name, island in plain.population.islands.items():
             typed.population.islands[name] = OmegaConf.structured(IslandConfig)
             typed.population.islands[name].learner = OmegaConf.structured(SCHEMAS["learner"][island.learner.name])
-        return OmegaConf.merge(typed, plain)
-    except (OmegaConfBaseException, AttributeError, KeyError, TypeError) as error:
-        said = str(error).splitlines()[0]
+        config = OmegaConf.merge(typed, plain)
+        env = OmegaConf.to_object(config.env)
+    except (OmegaConfBaseException, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+        said = first_line(error)
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
+    check_trusted(folder, env, trust)
+    return config
 
 
 def whole_choice(group: str, name: str) -> DictConfig:

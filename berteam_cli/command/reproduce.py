@@ -12,7 +12,7 @@ from rich.console import Console
 
 from berteam_cli.command.compare import compare
 from berteam_cli.command.evaluate import evaluate
-from berteam_cli.command.inspect import narrow, printed
+from berteam_cli.command.inspect import narrow, plain, printed
 from berteam_cli.command.report import report
 from berteam_cli.command.tournament import tournament
 from berteam_cli.command.train import train
@@ -208,4 +208,4 @@ def show(folder: Path, config: ReproduceConfig) -> None:
     if config.scale < 1:
         console.print("A smaller scale than 1 trains for less than the paper; its numbers are not the paper's.")
     for path in (folder / "paper.csv", folder / "report" / "report.html"):
-        console.print(str(path), highlight=False, soft_wrap=True)
+        console.print(plain(path), highlight=False, soft_wrap=True)

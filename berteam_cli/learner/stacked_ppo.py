@@ -167,6 +167,7 @@ class StackedPpo(Ppo):
 
     def restored(self, tensors: dict[str, Any]) -> PpoState:
         """Returns the state that ``tensors`` gave these, on the device."""
+        self.checked(tensors)
         return PpoState(
             Trained(*(tensors[name].to(self.device, copy=True) for name in Trained._fields)),
             Steps(*(tensors[name].to(self.device, copy=True) for name in Steps._fields)),
