@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -19,6 +20,11 @@ from berteam_cli.records import COLUMNS
 from berteam_cli.trust import told
 
 WHOLE = {"team": str, "blue": str, "red": str, "best_team": str, "opponent": str}  # 3 is a team, not a number
+TEXT = {
+    *(*WHOLE, "members", "name", "island", "algorithm", "side", "reason", "cycle", "decision", "run", "quantity"),
+    *("source", "choice", "kind", "group", "neighbour_name"),
+}
+"""Columns of words; all others are numbers."""
 
 
 def read_table(
@@ -50,6 +56,9 @@ def read_table(
     absent = [column for column in (COLUMNS[name] if columns is None else columns) if column not in table.columns]
     if absent:
         raise InputError(f"{path} is no table of this version: it has no column {absent[0]}.")
+    for column in (x for x in COLUMNS[name] if x in table.columns and x not in TEXT and len(table)):
+        if not is_numeric_dtype(table[column]):
+            raise InputError(f"{path} is no table of this version: in its column {column} are not only numbers.")
     return table
 
 
@@ -120,7 +129,11 @@ def show(folder: Path, top: int) -> None:
     console = Console(width=None if Console().is_terminal else 120)
     if (folder / "sweep.csv").exists():
         shown = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
-        console.print(printed(f"Sweep {folder}", pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[shown]))
+        try:
+            table = pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[shown]
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{folder / 'sweep.csv'} cannot be read as the table of a sweep: {error}.") from error
+        console.print(printed(f"Sweep {folder}", table))
         return
     manifest = read_manifest(folder)
     console.print(plain(f"{folder}: {manifest['status']}, started {manifest['started']}"), highlight=False)
@@ -191,6 +204,8 @@ def narrow(table: pd.DataFrame, told: Callable[[float, float, float], str] = spo
     for low in [x for x in table.columns if x == "low" or x.endswith("_low")]:
         name = low.removesuffix("_low") if low != "low" else "value" if "value" in table.columns else "elo"
         ends = [name, low, low.removesuffix("low") + "high"]
+        if not set(ends) <= set(table.columns):  # another version's
+            continue
         narrowed[name] = [told(*row) for row in table[ends].astype(float).itertuples(index=False)]
         narrowed = narrowed.drop(columns=ends[1:])
     return narrowed
