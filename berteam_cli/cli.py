@@ -222,7 +222,7 @@ def about(word: str, words: list[str]) -> None:
         InputError: that is said twice, or missing, or a sweep is asked for.
     """
     key, several = LEADING[word], LEADING[word] == "runs"
-    named = list(itertools.takewhile(lambda x: not x.startswith("-") and ("=" not in x or Path(x).is_dir()), words))
+    named = list(itertools.takewhile(lambda x: not x.startswith("-") and ("=" not in x or os.path.isdir(x)), words))
     named = named if several else named[:1]
     rest = words[len(named) :]
     if named and any(other.startswith(f"{key}=") for other in rest):

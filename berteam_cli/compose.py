@@ -22,6 +22,8 @@ from berteam_cli.errors import InputError, did_you_mean
 
 CONF = "berteam_cli.conf"
 HIDDEN = ("schema", "hydra")  # groups no user chooses from
+REFUSALS = (HydraException, OmegaConfBaseException, OSError, OverflowError, ValueError, RecursionError)
+"""What composing raises: the first two say what is wrong, the others come of numbers and names that are too long."""
 
 
 def prepare() -> None:
@@ -125,6 +127,9 @@ def parsed(overrides: list[str]) -> list[Override]:
             raise InputError(
                 f"{text!r} cannot be read as key=value: {str(error).splitlines()[0].rstrip('.')}."
             ) from error
+        except (ValueError, RecursionError) as error:  # of python itself, which says nothing of the key
+            key = text.partition("=")[0]
+            raise InputError(f"{key} cannot be read: its value is too long a number, or too deep a list.") from error
     return read
 
 
@@ -183,7 +188,7 @@ def composed(command: str, searched: list[str], overrides: list[Override]) -> Di
     lines = [x.input_line for x in overrides if x.input_line is not None]
     try:
         return compose(command, overrides=[*searched, *lines])
-    except (HydraException, OmegaConfBaseException) as error:
+    except REFUSALS as error:
         check_keys(command, searched, overrides)
         raise InputError(said(error)) from error
 
@@ -196,7 +201,9 @@ def said(error: Exception) -> str:
         error = error.__context__
     if isinstance(error, OmegaConfBaseException):
         return one_line(error)
-    return f"{str(error).splitlines()[0].rstrip('.')}."
+    first, *more = str(error).splitlines() or [type(error).__name__]
+    key = next((line.partition("full_key: ")[2] for line in more if "full_key: " in line), "")
+    return f"{key}: {first.rstrip('.')}." if key else f"{first.rstrip('.')}."
 
 
 def check_choice(override: Override, searched: list[str]) -> None:
@@ -227,7 +234,10 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
     if group.split("/", maxsplit=1)[0] == "schema":
         return []
     loader = GlobalHydra.instance().config_loader()
-    return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
+    try:
+        return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
+    except OSError:  # no file can have that name
+        return []
 
 
 def groups() -> list[str]:
@@ -252,7 +262,7 @@ def check_keys(command: str, searched: list[str], overrides: list[Override]) -> 
     chosen = [x for x in overrides if choices(x.key_or_group, searched)]
     try:
         config = compose(command, overrides=[*searched, *(x.input_line or "" for x in chosen)])
-    except (HydraException, OmegaConfBaseException):
+    except REFUSALS:
         return  # the choices themselves do not go together, and that error says more
     known = keys(config)
     for override in overrides:
