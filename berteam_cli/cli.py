@@ -6,6 +6,7 @@ Exit codes: 0 done, 2 the input is wrong, 3 the run failed, 130 interrupted.
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import itertools
 import os
@@ -65,6 +66,10 @@ def main() -> None:
     except BrokenPipeError:  # whoever read our output has seen enough, as head does
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (python flushes it at exit)
         sys.exit(0)
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        refuse(InputError(f"{error.filename} cannot be used: its name is too long."))
 
 
 def run(word: str, words: list[str]) -> None:

@@ -39,7 +39,7 @@ def claim(folder: Path, on_exists: str) -> None:
     Raises:
         InputError: it holds a run already, or it cannot be written.
     """
-    if (folder / MANIFEST).exists():
+    if os.path.exists(folder / MANIFEST):  # False for a name that no folder can have
         if on_exists != "overwrite":
             raise InputError(
                 f"out={folder} holds a run already; choose another folder, "
@@ -84,7 +84,7 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 def missing(folder: Path) -> list[Path]:
     """Returns the folders that must be made for ``folder`` to be there, outermost first."""
-    return [path for path in (*reversed(folder.parents), folder) if not path.exists()]
+    return [path for path in (*reversed(folder.parents), folder) if not os.path.exists(path)]
 
 
 class Manifest:

@@ -118,7 +118,7 @@ def whole_choice(group: str, name: str) -> DictConfig:
 
 def goes_on(config: TrainConfig, folder: Path | None) -> bool:
     """Returns whether ``config`` goes on with a run in ``folder``, None for one that is not known yet."""
-    return config.on_exists == "resume" and folder is not None and (folder / CONFIG).exists()
+    return config.on_exists == "resume" and folder is not None and os.path.exists(folder / CONFIG)
 
 
 def check_same(folder: Path, text: str) -> None:
@@ -149,7 +149,7 @@ def begun(folder: Path, on_exists: str, text: str, what: str, facts: dict[str, A
     Raises:
         InputError: the folder is not free, or holds work of another config, or such as is done.
     """
-    if on_exists == "resume" and (folder / CONFIG).exists():
+    if on_exists == "resume" and os.path.exists(folder / CONFIG):
         check_same(folder, text)
         if Manifest.of(folder).facts["status"] == "done":
             raise InputError(f"out={folder} holds this {what} already, and it is done.")

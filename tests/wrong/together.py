@@ -90,7 +90,7 @@ def paths(every: list[Known], rng: random.Random) -> Iterator[Wrong]:
         yield Wrong("path", ("tournament", f"run='{quoted}'"), "is no folder of a run|cannot be read")
     for command in ("resume", "inspect", "export", "evaluate", "report", "compare", "reproduce"):
         yield Wrong("path", (command,), "required: run|must be given first|needs")
-    for place in ("/proc/none", "/dev/null/x", "/nowhere/x/y", "a" * 300, "/"):
+    for place in ("/proc/none", "/dev/null/x", "/proc/self/x/y", "a" * 300, "/proc/1"):
         yield Wrong("path", ("train", *RPS[1:], "epochs=0", f"out={place}/z"), "out=.*cannot be written")
     yield Wrong(
         "path", ("report", "nowhere", "compare=nobody"), "compare=nobody is no folder that berteam compare wrote"
