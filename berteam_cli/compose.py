@@ -26,6 +26,14 @@ REFUSALS = (HydraException, OmegaConfBaseException, OSError, OverflowError, Valu
 """What composing raises: the first two say what is wrong, the others come of numbers and names that are too long."""
 
 
+UNUSED = {
+    "config_path": "the yaml files are the package's; --config-dir DIR adds a folder of yours",
+    "package": "every key has its place in the config; see --cfg job",
+    "experimental_rerun": "it unpickles a file, which may run code in it; name the same overrides again",
+}
+"""Flags of Hydra that have no place here, and why."""
+
+
 def prepare() -> None:
     """Registers the schemas and the one resolver that the yaml files use."""
     register()
@@ -44,7 +52,16 @@ def arguments(words: list[str]) -> Any:
         raise InputError(f"{message}; see --help.")
 
     parser.error = refuse  # type: ignore[assignment,method-assign]
-    return parser.parse_args(words)
+    given = parser.parse_args(words)
+    for name, why in UNUSED.items():
+        if getattr(given, name, None):
+            raise InputError(f"--{name.replace('_', '-')} cannot be used here: {why}.")
+    said = [f"--{name}" for name in ("run", "multirun", "cfg", "info") if getattr(given, name)]
+    if len(said) > 1:
+        raise InputError(f"{' and '.join(said)} cannot be used together; use one of them.")
+    if given.resolve and not given.cfg:
+        raise InputError("--resolve is for --cfg job, which it lets print values in place of what stands for them.")
+    return given
 
 
 def check(command: str, words: list[str], verify: Callable[[Any, list[str]], object]) -> None:

@@ -115,7 +115,15 @@ def flags(every: list[Known], rng: random.Random) -> Iterator[Wrong]:
             ("train", "--cfg"),
             ("train", "--cfg", "jbo"),
         ),
-        *(("train", "--info", "nothing"), ("train", "--package", "x"), ("train", "-cp", "nowhere"), ("train", "-z")),
+        *(
+            ("train", "--info", "nothing"),
+            ("train", "--package", "x"),
+            ("train", "-cp", "nowhere"),
+            ("train", "--experimental-rerun", "x.pickle"),
+            ("train", "--resolve"),
+            ("train", "--cfg", "job", "-m"),
+            ("train", "-z"),
+        ),
         *(
             ("inspect", ".", "--top"),
             ("inspect", ".", "--top", "ten"),
