@@ -237,7 +237,7 @@ def about(word: str, words: list[str]) -> None:
     asked = any(x.startswith(f"{key}=") for x in rest) or {"-h", "--help", "--cfg", "-c", "--info", "-i"} & set(rest)
     if not (named or asked or word == "replay"):
         raise InputError(f"berteam {word}: {key} must be given first; see berteam {word} --help.")
-    quoted = ["'" + x.replace("'", "\\'") + "'" for x in named]
+    quoted = ["'" + x.replace("'", "\\'").replace("${", "\\${") + "'" for x in named]  # a name is no interpolation
     if quoted:
         rest = [f"{key}=[{','.join(quoted)}]" if several else f"{key}={quoted[0]}", *rest]
     composed(word, rest)

@@ -59,11 +59,11 @@ def check_weights(learnt: Iterable[Learnt], network: nn.Module) -> None:
     Raises:
         ValueError: it is of another one.
     """
-    shapes = {name: value.shape for name, value in network.named_parameters()}
+    kinds = {name: (value.shape, value.dtype) for name, value in network.named_parameters()}
     for one in learnt:
         for kind in KINDS:
             held = getattr(one, kind)
-            if (held or kind != "averages") and {name: value.shape for name, value in held.items()} != shapes:
+            if (held or kind != "averages") and {name: (x.shape, x.dtype) for name, x in held.items()} != kinds:
                 raise ValueError(f"its selector's {kind} are of another network")
 
 
