@@ -14,6 +14,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from berteam_cli import checkpoint
+from berteam_cli.errors import RunError
 from berteam_cli.reading import last_state
 from tests.hostile.conftest import FEW, MARK, READERS, RUNS, Bomb, changed, refused
 
