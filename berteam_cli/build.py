@@ -39,6 +39,7 @@ from berteam_cli.selector.observations import looking
 from berteam_cli.selector.psro import Psro
 from berteam_cli.selector.uniform import Uniform
 from berteam_cli.training import Parts, rounds
+from berteam_cli.trust import imported
 from berteam_cli.workers import Workers, available_cores
 
 ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps, "pettingzoo": Pettingzoo}
@@ -65,7 +66,7 @@ def env(config: EnvConfig, team_size: int) -> Env:
         InputError: its settings do not go together.
     """
     settings = asdict(config)
-    if os.getcwd() not in sys.path:  # where a user's own reward may be; last, so that it hides nothing
+    if imported(config) and os.getcwd() not in sys.path:  # where a user's own may be; last, so that it hides nothing
         sys.path.append(os.getcwd())
     try:
         return ENVS[settings.pop("name")](team_size=team_size, **settings)

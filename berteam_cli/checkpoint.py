@@ -17,6 +17,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 
 from berteam_cli.errors import InputError, RunError
+from berteam_cli.fitting import check_run, check_said
 from berteam_cli.population import ARRAYS, Population
 from berteam_cli.tensors import below
 from berteam_cli.training import Parts, Run
@@ -25,6 +26,11 @@ log = logging.getLogger("berteam")
 
 SCHEMA = 5  # raised when a file of an older version could be misread
 KEPT = 2
+DAMAGES = (
+    *(OSError, ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError),
+    *(RuntimeError, RecursionError, MemoryError, SafetensorError),
+)
+"""What reading raises for files that are cut, changed or made up."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +128,7 @@ def load(folder: Path, parts: Parts) -> Saved:
     for place in sorted((folder / "checkpoint").glob("epoch_*"), reverse=True):
         try:
             return read(place, parts)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, SafetensorError) as error:
+        except DAMAGES as error:
             damage = f"{place.name} is damaged: {error}"
             log.warning("Checkpoint %s; the one before is tried.", damage)
     raise RunError(f"{folder} has no checkpoint to go on from ({damage}).")
@@ -135,7 +141,7 @@ def check_schema(folder: Path) -> None:
         InputError: they are another version's.
     """
     for place in (folder / "checkpoint").glob("epoch_*"):
-        with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+        with contextlib.suppress(*DAMAGES):
             if (schema := json.loads((place / "state.json").read_text(encoding="utf-8"))["schema"]) != SCHEMA:
                 raise InputError(
                     f"{folder} is a run of another version of berteam, whose checkpoints (schema {schema}, "
@@ -152,6 +158,7 @@ def read(place: Path, parts: Parts) -> Saved:
     said = json.loads((place / "state.json").read_text(encoding="utf-8"))
     if said["schema"] != SCHEMA:
         raise ValueError(f"its schema is {said['schema']}, this version reads {SCHEMA}")
+    check_said(said)
     if checksum(said) != said["checksum"] or digest(place / "tensors.safetensors") != said["sha256"]:
         raise ValueError("its checksum is wrong")
     # In memory of their own: by where a tensor lies torch chooses its kernels, and so the last bits of what comes out.
@@ -164,6 +171,7 @@ def read(place: Path, parts: Parts) -> Saved:
     arrays = {name: tensors[f"population.{name}"].numpy() for name in ARRAYS}
     selection = parts.selector.restored(below(tensors, "selector."))
     run = Run(said["epoch"], Population(minds=minds, **arrays), selection, said["played"], said["steps"])
+    check_run(run, parts)
     return Saved(run, said["table_sizes"], said["seconds"])
 
 

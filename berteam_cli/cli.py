@@ -6,6 +6,7 @@ Exit codes: 0 done, 2 the input is wrong, 3 the run failed, 130 interrupted.
 from __future__ import annotations
 
 import argparse
+import errno
 import importlib
 import itertools
 import os
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from berteam_cli import __version__
-from berteam_cli.errors import InputError, RunError, did_you_mean
+from berteam_cli.errors import InputError, RunError, did_you_mean, sentence
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -67,6 +68,10 @@ def main() -> None:
     except BrokenPipeError:  # whoever read our output has seen enough, as head does
         sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (python flushes it at exit)
         sys.exit(0)
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        refuse(InputError(f"{error.filename} cannot be used: its name is too long."))
 
 
 def run(word: str, words: list[str]) -> None:
@@ -194,7 +199,7 @@ def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) 
 
 def refuse(error: InputError | RunError) -> NoReturn:
     """Says what is wrong and exits with the error's code."""
-    print(f"berteam: {error}", file=sys.stderr)
+    print(f"berteam: {sentence(error)}", file=sys.stderr)
     raise SystemExit(error.code) from None
 
 
@@ -239,7 +244,7 @@ def about(word: str, words: list[str]) -> None:
         InputError: that is said twice, or missing, or a sweep is asked for.
     """
     key, several = LEADING[word], LEADING[word] == "runs"
-    named = list(itertools.takewhile(lambda x: not x.startswith("-") and ("=" not in x or Path(x).is_dir()), words))
+    named = list(itertools.takewhile(lambda x: not x.startswith("-") and ("=" not in x or os.path.isdir(x)), words))
     named = named if several else named[:1]
     rest = words[len(named) :]
     if named and any(other.startswith(f"{key}=") for other in rest):
@@ -249,7 +254,7 @@ def about(word: str, words: list[str]) -> None:
     asked = any(x.startswith(f"{key}=") for x in rest) or {"-h", "--help", "--cfg", "-c", "--info", "-i"} & set(rest)
     if not (named or asked or word == "replay"):
         raise InputError(f"berteam {word}: {key} must be given first; see berteam {word} --help.")
-    quoted = ["'" + x.replace("'", "\\'") + "'" for x in named]
+    quoted = ["'" + x.replace("'", "\\'").replace("${", "\\${") + "'" for x in named]  # a name is no interpolation
     if quoted:
         rest = [f"{key}=[{','.join(quoted)}]" if several else f"{key}={quoted[0]}", *rest]
     composed(word, rest)
@@ -274,13 +279,14 @@ def inspect(word: str, words: list[str]) -> None:
         word,
         words,
         run={"type": Path, "help": "folder of the run"},
+        overrides={"nargs": "*", "help": "trust=MODULE:FUNCTION, code that the run's game may import"},
         __top={"type": int, "default": 10, "help": "rows of each table"},
     )
     if given.top < 1:
         raise InputError(f"--top must be >= 1, but is {given.top}.")
     from berteam_cli.command.inspect import inspect as look  # noqa: PLC0415
 
-    look(given.run, given.top)
+    look(given.run, given.top, given.overrides)
 
 
 def listing(word: str, words: list[str]) -> None:

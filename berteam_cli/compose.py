@@ -24,6 +24,16 @@ from berteam_cli.errors import InputError, did_you_mean
 
 CONF = "berteam_cli.conf"
 HIDDEN = ("schema", "hydra")  # groups no user chooses from
+REFUSALS = (HydraException, OmegaConfBaseException, OSError, OverflowError, ValueError, RecursionError)
+"""What composing raises: the first two say what is wrong, the others come of numbers and names that are too long."""
+
+
+UNUSED = {
+    "config_path": "the yaml files are the package's; --config-dir DIR adds a folder of yours",
+    "package": "every key has its place in the config; see --cfg job",
+    "experimental_rerun": "it unpickles a file, which may run code in it; name the same overrides again",
+}
+"""Flags of Hydra that have no place here, and why."""
 
 
 def prepare() -> None:
@@ -44,7 +54,16 @@ def arguments(words: list[str]) -> Any:
         raise InputError(f"{message}; see --help.")
 
     parser.error = refuse  # type: ignore[assignment,method-assign]
-    return parser.parse_args(words)
+    given = parser.parse_args(words)
+    for name, why in UNUSED.items():
+        if getattr(given, name, None):
+            raise InputError(f"--{name.replace('_', '-')} cannot be used here: {why}.")
+    said = [f"--{name}" for name in ("run", "multirun", "cfg", "info") if getattr(given, name)]
+    if len(said) > 1:
+        raise InputError(f"{' and '.join(said)} cannot be used together; use one of them.")
+    if given.resolve and not given.cfg:
+        raise InputError("--resolve is for --cfg job, which it lets print values in place of what stands for them.")
+    return given
 
 
 def check(command: str, words: list[str], verify: Callable[[Any, list[str]], object]) -> None:
@@ -127,6 +146,9 @@ def parsed(overrides: list[str]) -> list[Override]:
             raise InputError(
                 f"{text!r} cannot be read as key=value: {str(error).splitlines()[0].rstrip('.')}."
             ) from error
+        except (ValueError, RecursionError) as error:  # of python itself, which says nothing of the key
+            key = text.partition("=")[0]
+            raise InputError(f"{key} cannot be read: its value is too long a number, or too deep a list.") from error
     return read
 
 
@@ -187,7 +209,7 @@ def composed(command: str, searched: list[str], overrides: list[Override]) -> Di
     lines = [x.input_line for x in overrides if x.input_line is not None]
     try:
         return compose(command, overrides=[*searched, *lines])
-    except (HydraException, OmegaConfBaseException) as error:
+    except REFUSALS as error:
         check_keys(command, searched, overrides)
         raise InputError(said(error)) from error
 
@@ -200,7 +222,9 @@ def said(error: Exception) -> str:
         error = error.__context__
     if isinstance(error, OmegaConfBaseException):
         return one_line(error)
-    return f"{str(error).splitlines()[0].rstrip('.')}."
+    first, *more = str(error).splitlines() or [type(error).__name__]
+    key = next((line.partition("full_key: ")[2] for line in more if "full_key: " in line), "")
+    return f"{key}: {first.rstrip('.')}." if key else f"{first.rstrip('.')}."
 
 
 def check_choice(override: Override, searched: list[str]) -> None:
@@ -216,8 +240,8 @@ def check_choice(override: Override, searched: list[str]) -> None:
     value = override.value()
     given = value.list if isinstance(value, ChoiceSweep) else [value]
     for item in given:
-        text = str(getattr(item, "text", item))
-        if item is not None and text not in allowed:
+        text = "null" if item is None else str(getattr(item, "text", item))
+        if text not in allowed:
             raise InputError.choice(group, text, allowed)
 
 
@@ -233,7 +257,10 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
     if first == "schema" or not (searched or first in all_groups()):
         return []
     loader = GlobalHydra.instance().config_loader()
-    return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
+    try:
+        return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
+    except OSError:  # no file can have that name
+        return []
 
 
 def groups() -> list[str]:
@@ -264,7 +291,7 @@ def check_keys(command: str, searched: list[str], overrides: list[Override]) -> 
     chosen = [x for x in overrides if choices(x.key_or_group, searched)]
     try:
         config = compose(command, overrides=[*searched, *(x.input_line or "" for x in chosen)])
-    except (HydraException, OmegaConfBaseException):
+    except REFUSALS:
         return  # the choices themselves do not go together, and that error says more
     known = keys(config)
     for override in overrides:

@@ -65,6 +65,7 @@ class TournamentConfig(CommandConfig):
     """Settings of ``berteam tournament``."""
 
     run: Any = MISSING
+    trust: Any = MISSING
     policies: list[str] = MISSING
     fixed: bool = MISSING
     teams: list[str] = MISSING
@@ -81,6 +82,7 @@ class ReplayConfig:
     """Settings of ``berteam replay``."""
 
     run: str | None = MISSING
+    trust: Any = MISSING
     blue: str | None = MISSING
     red: str | None = MISSING
     seed: int = number(0, 2**63 - 1)
@@ -97,6 +99,7 @@ class OutputConfig:
 
     seed: int = number(0, 2**63 - 1)
     workers: int = number(0, 4096)
+    trust: Any = MISSING
 
 
 @dataclass
@@ -143,6 +146,7 @@ class ReportConfig:
 
     runs: list[str] = MISSING
     compare: str | None = MISSING
+    trust: Any = MISSING
     seed: int = number(0, 2**63 - 1)
     out: str | None = MISSING
     on_exists: str = choice("error", "overwrite")

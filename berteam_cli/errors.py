@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from difflib import get_close_matches
 
@@ -29,3 +30,17 @@ def did_you_mean(given: str, allowed: Iterable[str]) -> str:
     words = {word.lower(): word for word in allowed}
     near = get_close_matches(str(given).lower(), list(words), n=1, cutoff=0.5)
     return f" Did you mean {words[near[0]]}?" if near else ""
+
+
+LONGEST = 1000  # of a word in an error; no path and no name that somebody typed is longer
+
+
+def shown(text: str) -> str:
+    """Returns ``text`` as one line that a terminal only shows: what it would obey is written as in a Python string."""
+    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
+
+
+def sentence(error: Exception) -> str:
+    """Returns what an error says as one line, with words that nobody would read to their end cut in the middle."""
+    most = LONGEST // 2
+    return re.sub(rf"\S{{{LONGEST},}}", lambda word: f"{word[0][:most]}…{word[0][-most:]}", shown(str(error)))

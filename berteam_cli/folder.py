@@ -17,7 +17,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from berteam_cli.errors import InputError, RunError
+from berteam_cli.errors import InputError, RunError, shown
 from berteam_cli.records import COLUMNS, EVALUATION, SHEET_ENDINGS, SHEETS
 
 MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
@@ -39,7 +39,7 @@ def claim(folder: Path, on_exists: str) -> None:
     Raises:
         InputError: it holds a run already, or it cannot be written.
     """
-    if not (folder / MANIFEST).exists():
+    if not os.path.exists(folder / MANIFEST):
         return
     if on_exists != "overwrite":
         raise InputError(
@@ -92,7 +92,7 @@ def write_text(path: Path, text: str) -> None:
 
 def missing(folder: Path) -> list[Path]:
     """Returns the folders that must be made for ``folder`` to be there, outermost first."""
-    return [path for path in (*reversed(folder.parents), folder) if not path.exists()]
+    return [path for path in (*reversed(folder.parents), folder) if not os.path.exists(path)]
 
 
 class Manifest:
@@ -203,10 +203,14 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """
     try:
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{folder} is no folder of a run: it has no readable {MANIFEST}.") from error
     if not isinstance(manifest, dict) or not {"status", "started", "command"} <= manifest.keys():
         raise InputError(f"{folder} is no folder of a run: its {MANIFEST} is not one.")
+    for key, kind in FACTS.items():
+        if key in manifest and not isinstance(manifest[key], kind):
+            raise InputError(f"{folder} is no folder of a run: {key} in its {MANIFEST} is of another kind.")
+    check_links(folder)
     return manifest
 
 
@@ -215,15 +219,45 @@ class Lines(logging.FileHandler):
 
     def handleError(self, record: logging.LogRecord) -> None:
         """Does nothing."""
+FACTS = {"status": str, "started": str, "command": list, "resumed": list, "overrides": list, "error": str}
+"""Kinds of what commands read of a manifest."""
+INSIDE = ("checkpoint", EVALUATION, "report", "replay", "tensorboard", "mlflow", "wandb")
+"""Folders in that of a run, where commands read and write."""
+
+
+def check_links(folder: Path) -> None:
+    """Checks that nothing in the run's ``folder`` leads out of it: it would be read, shown or written over.
+
+    The folder itself may be a link, and have links to its own files.
+
+    Raises:
+        InputError: something does.
+    """
+    home = folder.resolve()
+    inside = (path for name in INSIDE for path in (folder / name).rglob("*"))
+    for path in (*folder.iterdir(), *inside):
+        try:
+            kept = not path.is_symlink() or path.resolve().is_relative_to(home)
+        except (OSError, RuntimeError):  # a link to itself
+            kept = False
+        if not kept:
+            raise InputError(f"{path} is a link out of the run's folder, which must hold its files itself.")
+
+
+class Plain(logging.Formatter):
+    """Writes lines that a terminal only shows, whatever signs are in the names in them."""
+
+    def format(self, record: logging.LogRecord) -> str:  # noqa: D102
+        return "\n".join(shown(line) for line in super().format(record).split("\n"))
 
 
 @contextmanager
 def logging_to(folder: Path) -> Iterator[None]:
     """Sends the log to the terminal and, with times, to the folder's log.txt."""
     file = Lines(folder / LOG, encoding="utf-8")
-    file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    file.setFormatter(Plain("%(asctime)s %(levelname)s %(message)s"))
     terminal = logging.StreamHandler(sys.stdout)
-    terminal.setFormatter(logging.Formatter("%(message)s"))
+    terminal.setFormatter(Plain("%(message)s"))
     log.setLevel(logging.INFO)
     log.propagate = False
     log.handlers = [file, terminal]

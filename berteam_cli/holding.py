@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import fcntl
 import logging
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from berteam_cli.errors import InputError, RunError
-from berteam_cli.folder import LOG, missing
+from berteam_cli.folder import LOG, MANIFEST, check_links, missing
 
 log = logging.getLogger("berteam")
 
@@ -27,6 +28,8 @@ def held(folder: Path) -> Iterator[None]:
         RunError: it could not be written any more.
     """
     made = missing(folder)
+    if os.path.exists(folder / MANIFEST):  # False for a name that no folder can have
+        check_links(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / LOG).open("a", encoding="utf-8")

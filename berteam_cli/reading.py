@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 from berteam_cli import build, checkpoint
@@ -13,18 +14,19 @@ from berteam_cli.stored import plain_config, stored_config
 from berteam_cli.training import Parts, Run
 
 
-def last_state(folder: Path, workers: int | None = None) -> tuple[Parts, Run]:
+def last_state(folder: Path, workers: int | None = None, trust: Collection[str] = ()) -> tuple[Parts, Run]:
     """Returns the parts of the run in ``folder`` and its newest checkpoint that is whole.
 
     Args:
         folder: of the run.
         workers: threads that play; 0: as many as there are cores; None: as many as the run had.
+        trust: what the run's game may import.
 
     Raises:
         InputError: there is no such run, or it has no such checkpoint.
     """
     read_manifest(folder)
-    config = checked(stored_config(folder))
+    config = checked(stored_config(folder, trust))
     if workers is not None:
         config.workers = workers
     parts = build.parts_to_read(config)

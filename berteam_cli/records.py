@@ -8,11 +8,12 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from berteam_cli.errors import RunError
+from berteam_cli.errors import RunError, shown
 from berteam_cli.learner.base import LEARNING_FIGURES
 from berteam_cli.outcomes import Ints
 
@@ -112,10 +113,19 @@ def team_names(teams: Ints) -> list[str]:
     return [team_name(team) for team in teams]
 
 
+FORMULA = re.compile(r"(?:^|(?<=;))[=+@-]")
+"""Where a formula begins: in the first sign of a cell, and for those who split lines at semicolons behind one."""
+
+
 def cell(value: Any) -> Any:
-    """Returns ``value`` as it is written: floats so that they read back equal, nothing where there is no number."""
+    """Returns ``value`` as it is written: floats so that they read back equal, nothing where there is no number.
+
+    Text in which a spreadsheet would see a formula gets an apostrophe, which makes it text there, too.
+    """
     if isinstance(value, float):  # numpy's floats are floats too
         return "" if math.isnan(value) else repr(float(value))
+    if isinstance(value, str):
+        return FORMULA.sub(r"'\g<0>", shown(value))
     return value
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
@@ -19,9 +20,11 @@ from berteam_cli.config_groups import IslandConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import CONFIG, MANIFEST, Manifest, claim, write_text
 from berteam_cli.holding import held
+from berteam_cli.trust import check_trusted
 
 MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation", "logger")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
+LARGEST = 2**24  # bytes of a config; usual are three thousand
 PLACE = ("out", "on_exists")
 """Keys that say where a run goes, not what it does."""
 
@@ -32,25 +35,52 @@ def write_config(folder: Path, text: str) -> None:
 
 
 def plain_config(folder: Path) -> DictConfig:
-    """Returns the config of the run in ``folder`` as it stands there.
+    """Returns the config of the run in ``folder`` as it stands there: values, and nothing that stands for others.
 
     Raises:
         InputError: it cannot be read.
     """
     try:
-        config = OmegaConf.load(folder / CONFIG)
-    except (OSError, ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
-        raise InputError(f"{folder / CONFIG} cannot be read: {str(error).splitlines()[0]}.") from error
+        config = OmegaConf.create(plain_yaml(folder / CONFIG))
+    except (OSError, ValueError, RecursionError, yaml.YAMLError, OmegaConfBaseException) as error:
+        raise InputError(f"{folder / CONFIG} cannot be read: {first_line(error)}.") from error
     if not isinstance(config, DictConfig):
         raise InputError(f"{folder / CONFIG} cannot be read: it holds no keys.")
     return config
 
 
-def stored_config(folder: Path) -> DictConfig:
-    """Returns the config of the training run in ``folder``, with its schemas.
+def plain_yaml(path: Path) -> str:
+    """Returns the text of a yaml file that holds values only, as a run writes it.
 
     Raises:
-        InputError: it cannot be read, is not a training's or another version's.
+        OSError: it cannot be read.
+        ValueError: it has tags, which may stand for objects, interpolations, which may stand for anything on this
+            machine, or aliases, which a few lines may make millions of; or is no yaml, or too large.
+    """
+    if path.stat().st_size > LARGEST:
+        raise ValueError(f"it has more than {LARGEST >> 20} MiB")
+    text = path.read_text(encoding="utf-8")
+    for token in yaml.scan(text, Loader=yaml.SafeLoader):
+        said = token.value if isinstance(token, yaml.ScalarToken) else ""
+        if isinstance(token, yaml.TagToken | yaml.AnchorToken | yaml.AliasToken) or "${" in said:
+            raise ValueError(f"line {token.start_mark.line + 1} has a tag, an alias or an interpolation, and no value")
+    return text
+
+
+def first_line(error: Exception) -> str:
+    """Returns the first line of what an error says, or of what kind it is."""
+    return f"{error}".partition("\n")[0].rstrip(".") or type(error).__name__
+
+
+def stored_config(folder: Path, trust: Collection[str] = ()) -> DictConfig:
+    """Returns the config of the training run in ``folder``, with its schemas.
+
+    Args:
+        folder: of the run.
+        trust: what the run's game may import.
+
+    Raises:
+        InputError: it cannot be read, is not a training's or another version's, or imports something else.
     """
     check_schema(folder)
     plain = plain_config(folder)
@@ -64,10 +94,13 @@ def stored_config(folder: Path) -> DictConfig:
         for name, island in plain.population.islands.items():
             typed.population.islands[name] = OmegaConf.structured(IslandConfig)
             typed.population.islands[name].learner = OmegaConf.structured(SCHEMAS["learner"][island.learner.name])
-        return cast("DictConfig", OmegaConf.merge(typed, plain))
-    except (OmegaConfBaseException, AttributeError, KeyError, TypeError) as error:
-        said = str(error).splitlines()[0]
+        config = cast("DictConfig", OmegaConf.merge(typed, plain))
+        env = OmegaConf.to_object(config.env)
+    except (OmegaConfBaseException, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
+        said = first_line(error)
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
+    check_trusted(folder, env, trust)
+    return config
 
 
 def whole_choice(group: str, name: str) -> DictConfig:
@@ -85,7 +118,7 @@ def whole_choice(group: str, name: str) -> DictConfig:
 
 def goes_on(config: TrainConfig, folder: Path | None) -> bool:
     """Returns whether ``config`` goes on with a run in ``folder``, None for one that is not known yet."""
-    return config.on_exists == "resume" and folder is not None and (folder / CONFIG).exists()
+    return config.on_exists == "resume" and folder is not None and os.path.exists(folder / CONFIG)
 
 
 def check_same(folder: Path, text: str) -> None:
@@ -118,7 +151,7 @@ def begun(folder: Path, on_exists: str, text: str, what: str, facts: dict[str, A
         InputError: the folder is not free, or holds work of another config, or such as is done.
     """
     with held(folder):
-        if on_exists == "resume" and (folder / MANIFEST).exists():
+        if on_exists == "resume" and os.path.exists(folder / MANIFEST):
             check_same(folder, text)
             if Manifest.of(folder).facts["status"] == "done":
                 raise InputError(f"out={folder} holds this {what} already, and it is done.")

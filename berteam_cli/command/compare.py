@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from rich.console import Console
 
-from berteam_cli.command.inspect import narrow, printed, read_table
+from berteam_cli.command.inspect import narrow, plain, printed, read_table
 from berteam_cli.config_commands import CompareConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.comparison import Comparison, Figures, Played, compared, counted, planned
@@ -27,6 +27,7 @@ from berteam_cli.rating.bootstrap import superiority, with_interval
 from berteam_cli.records import COLUMNS, write_table
 from berteam_cli.stored import begun
 from berteam_cli.training import key
+from berteam_cli.trust import trusted
 from berteam_cli.workers import Workers, available_cores
 
 log = logging.getLogger("berteam")
@@ -47,7 +48,7 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
         InputError: the runs cannot be compared, or the folder is not free.
         RunError: it failed.
     """
-    runs = contenders([Path(x) for x in config.runs])
+    runs = contenders([Path(x) for x in config.runs], trusted(config.trust))
     names, of = algorithms(runs)
     seconds = [times(x.folder) for x in runs]
     folder = folder or new_folder("compare")
@@ -137,4 +138,4 @@ def show(folder: Path) -> None:
     titles = ("Algorithms: Elo with 95 % intervals, seconds", "Runs", "Algorithm against algorithm")
     for name, title in zip(TABLES, titles, strict=True):
         console.print(printed(title, narrow(pd.read_csv(folder / f"{name}.csv"))))
-        console.print(str(folder / f"{name}.csv"), highlight=False, soft_wrap=True)
+        console.print(plain(folder / f"{name}.csv"), highlight=False, soft_wrap=True)

@@ -26,6 +26,7 @@ from berteam_cli.records import team_names
 from berteam_cli.selector.base import team_count, unordered_teams
 from berteam_cli.stored import plain_config, stored_config
 from berteam_cli.training import RECORDS, generator
+from berteam_cli.trust import trusted
 
 MOST_GAMES = 1_000_000  # some hours
 
@@ -213,11 +214,11 @@ def of_runs(config: TournamentConfig, runs: list[Path]) -> Entry:
     """
     tables, teams, called, first = [], [], [], 0
     epochs: list[int] = []
-    game = None
+    game, trust = None, trusted(config.trust)
     for folder in runs:
         if config.out and Path(config.out).resolve() == folder.resolve():
             raise InputError(f"out must be another folder than run, but both are {config.out}.")
-        parts, run = last_state(folder)
+        parts, run = last_state(folder, trust=trust)
         if game is None:
             game = parts.games
         elif parts.games.env.fingerprint() != game.env.fingerprint():
@@ -231,7 +232,7 @@ def of_runs(config: TournamentConfig, runs: list[Path]) -> Entry:
         prefix = f"{folder.name if unique(folder, runs) else folder}/" if len(runs) > 1 else ""
         called += [f"{prefix}{name}" for name in names(islands, run.population)]
         first, epochs = len(called), [*epochs, run.epoch]
-    trained = checked(stored_config(runs[0]))
+    trained = checked(stored_config(runs[0], trust))
     trained.workers = config.workers
     games = build.games(replace(trained, env=started(trained.env, config)))
     if config.fixed:

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.random import Generator
 from rich.console import Console
 
-from berteam_cli.command.inspect import printed
+from berteam_cli.command.inspect import plain, printed
 from berteam_cli.config_commands import EvaluateConfig
 from berteam_cli.evaluation.calibration import deciles
 from berteam_cli.evaluation.conditioning import conditioning_rows, encounters
@@ -38,6 +38,7 @@ from berteam_cli.selector.independent import with_all_teams
 from berteam_cli.stored import write_config
 from berteam_cli.training import EVALUATION as CHANCE
 from berteam_cli.training import Parts, Run, generator
+from berteam_cli.trust import trusted
 
 ENCOUNTERS = 40  # with each fixed team, to tell what having seen it is worth
 PLAYED, MEMBERS, REPLAYED, PAYOFFS, MET = SHEETS
@@ -65,7 +66,7 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
         KeyboardInterrupt: it was interrupted; what is played is kept.
     """
     folder = Path(config.run)
-    parts, run = last_state(folder, config.workers)
+    parts, run = last_state(folder, config.workers, trusted(config.trust))
     far = how_far(folder, run.epoch)
     place = folder / EVALUATION
     look = Look(config, parts, run, place, Console(width=None if Console().is_terminal else 120))
@@ -210,7 +211,7 @@ class Look:
 
     def say(self, sentence: str) -> None:
         """Prints a sentence."""
-        self.console.print(sentence, highlight=False, soft_wrap=True)
+        self.console.print(plain(sentence), highlight=False, soft_wrap=True)
 
     def show(self, title: str, tables: Tables, name: str, leave: Sequence[str] = (), *, whole: bool = False) -> None:
         """Prints the first rows of a table, as many as the config says, or the ``whole`` of it."""

@@ -9,11 +9,12 @@ from gymnasium.spaces import Box
 
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
-from berteam_cli.errors import InputError, did_you_mean
+from berteam_cli.errors import InputError, did_you_mean, shown
 from berteam_cli.folder import write_whole
 from berteam_cli.learner.exporting import exported
 from berteam_cli.population import island_of, names
 from berteam_cli.reading import last_state
+from berteam_cli.trust import told
 
 KEYS = ("agent", "out", "on_exists")
 ON_EXISTS = ("error", "overwrite")
@@ -24,13 +25,14 @@ def export(folder: Path, overrides: list[str]) -> Path:
 
     Args:
         folder: of a training run.
-        overrides: ``key=value`` of KEYS.
+        overrides: ``key=value`` of KEYS, and ``trust=module:function``.
 
     Raises:
         InputError: there is no such run or member, it has no networks, or a file is in the way.
     """
+    trust, overrides = told(overrides)
     given = read_overrides(overrides)
-    parts, run = last_state(folder)
+    parts, run = last_state(folder, trust=trust)
     islands = parts.optimizer.islands
     agent = member(given["agent"], run.population.size)
     path = place(folder, agent, given)
@@ -42,7 +44,9 @@ def export(folder: Path, overrides: list[str]) -> Path:
     except ValueError as error:
         raise InputError(f"agent={agent} ({called}) cannot be exported: {error}.") from error
     write_whole(path, model.save)
-    print(f"{called} of {folder} after epoch {run.epoch}.", loading(type(model), path), path, sep="\n")
+    print(
+        shown(f"{called} of {folder} after epoch {run.epoch}."), loading(type(model), path), shown(str(path)), sep="\n"
+    )
     return path
 
 

@@ -9,14 +9,22 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
-from berteam_cli.errors import InputError
+from berteam_cli.errors import InputError, shown
 from berteam_cli.folder import read_manifest
 from berteam_cli.records import COLUMNS
+from berteam_cli.trust import told
 
 WHOLE = {"team": str, "blue": str, "red": str, "best_team": str, "opponent": str}  # 3 is a team, not a number
+TEXT = {
+    *(*WHOLE, "members", "name", "island", "algorithm", "side", "reason", "cycle", "decision", "run", "quantity"),
+    *("source", "choice", "kind", "group", "neighbour_name"),
+}
+"""Columns of words; all others are numbers."""
 
 
 def read_table(
@@ -48,6 +56,9 @@ def read_table(
     absent = [column for column in (COLUMNS[name] if columns is None else columns) if column not in table.columns]
     if absent:
         raise InputError(f"{path} is no table of this version: it has no column {absent[0]}.")
+    for column in (x for x in COLUMNS[name] if x in table.columns and x not in TEXT and len(table)):
+        if not is_numeric_dtype(table[column]):
+            raise InputError(f"{path} is no table of this version: in its column {column} are not only numbers.")
     return table
 
 
@@ -62,24 +73,28 @@ def whole_lines(text: bytes) -> int:
     return begin if len(last) < len(first) and b'"' not in text[begin:] else len(text)
 
 
-def inspect(folder: Path, top: int) -> None:
+def inspect(folder: Path, top: int, overrides: Sequence[str] = ()) -> None:
     """Prints the tables of a run, and where its distribution over teams is only sampled, what a search finds.
 
     Args:
         folder: of a run, or of a sweep, whose table is printed.
         top: rows of each table.
+        overrides: ``trust=module:function``.
 
     Raises:
         InputError: there is no run, or a table cannot be read.
         RunError: it has no whole checkpoint to search.
     """
+    trust, others = told(overrides)
+    if others:
+        raise InputError(f"{others[0]} is no key of berteam inspect; there is trust=module:function, and --top.")
     show(folder, top)
     teams = read_table(folder, "team_distribution")
     if teams is not None and (teams.team == "other").any() and (folder / "checkpoint").exists():
-        Console(width=None if Console().is_terminal else 120).print(searched(folder, top))
+        Console(width=None if Console().is_terminal else 120).print(searched(folder, top, trust))
 
 
-def searched(folder: Path, top: int) -> Table:
+def searched(folder: Path, top: int, trust: Sequence[str]) -> Table:
     """Returns the most probable teams that a search in the last checkpoint of a run finds.
 
     Raises:
@@ -92,7 +107,7 @@ def searched(folder: Path, top: int) -> Table:
     from berteam_cli.stored import stored_config  # noqa: PLC0415
     from berteam_cli.training import RECORDS, generator  # noqa: PLC0415
 
-    parts = build.parts_to_read(checked(stored_config(folder)))
+    parts = build.parts_to_read(checked(stored_config(folder, trust)))
     run = checkpoint.load(folder, parts).run
     found = parts.selector.likeliest(run.selection, top, generator(parts.seed, RECORDS, run.epoch))
     errors = [0.0] * len(found.teams) if found.error is None else found.error
@@ -113,11 +128,15 @@ def show(folder: Path, top: int) -> None:
     """
     console = Console(width=None if Console().is_terminal else 120)
     if (folder / "sweep.csv").exists():
-        columns = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
-        console.print(printed(f"Sweep {folder}", pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[columns]))
+        shown = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
+        try:
+            table = pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[shown]
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{folder / 'sweep.csv'} cannot be read as the table of a sweep: {error}.") from error
+        console.print(printed(f"Sweep {folder}", table))
         return
     manifest = read_manifest(folder)
-    console.print(f"{folder}: {manifest['status']}, started {manifest['started']}", highlight=False)
+    console.print(plain(f"{folder}: {manifest['status']}, started {manifest['started']}"), highlight=False)
     shown = ("summary", "elo", "team_distribution", "agents", "pairs")
     tables = {name: read_table(folder, name, whole=manifest["status"] == "done") for name in shown}
     summary, elo, teams, agents = (tables[x] for x in ("summary", "elo", "team_distribution", "agents"))
@@ -133,18 +152,23 @@ def show(folder: Path, top: int) -> None:
         last = agents[agents.epoch == agents.epoch.max()].sort_values("fitness", ascending=False, kind="stable")
         console.print(printed(f"Fittest members after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))
     files = sorted(path.name for path in folder.iterdir() if path.suffix in {".csv", ".json", ".yaml", ".txt"})
-    console.print(f"Files in {folder}: {', '.join(files)}", highlight=False)
-    console.print(f"See them again with: berteam inspect {folder}", highlight=False)
+    console.print(plain(f"Files in {folder}: {', '.join(files)}"), highlight=False)
+    console.print(plain(f"See them again with: berteam inspect {folder}"), highlight=False)
 
 
 def printed(title: str, frame: pd.DataFrame) -> Table:
     """Returns ``frame`` as a table for the terminal."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=plain(title), title_justify="left")
     for column in frame.columns:
-        table.add_column(str(column), justify="left" if column in {"members", "team", "name", "figure"} else "right")
+        table.add_column(plain(column), justify="left" if column in {"members", "team", "name", "figure"} else "right")
     for row in frame.itertuples(index=False):
-        table.add_row(*(text(value) for value in row))
+        table.add_row(*(plain(text(value)) for value in row))
     return table
+
+
+def plain(value: object) -> str:
+    """Returns a text from a file or a name so that the terminal and rich show it and obey nothing in it."""
+    return escape(shown(str(value)))
 
 
 def text(value: object) -> str:
@@ -180,6 +204,8 @@ def narrow(table: pd.DataFrame, told: Callable[[float, float, float], str] = spo
     for low in [x for x in table.columns if x == "low" or x.endswith("_low")]:
         name = low.removesuffix("_low") if low != "low" else "value" if "value" in table.columns else "elo"
         ends = [name, low, low.removesuffix("low") + "high"]
+        if not set(ends) <= set(table.columns):  # another version's
+            continue
         narrowed[name] = [told(*row) for row in table[ends].astype(float).itertuples(index=False)]
         narrowed = narrowed.drop(columns=ends[1:])
     return narrowed

@@ -16,12 +16,13 @@ from berteam_cli.config import checked
 from berteam_cli.config_commands import ReplayConfig
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
-from berteam_cli.errors import InputError, RunError
+from berteam_cli.errors import InputError, RunError, shown
 from berteam_cli.folder import new_folder, read_manifest, write_whole
 from berteam_cli.games import Games, pairings
 from berteam_cli.outcomes import Experience, Ints, Outcomes
 from berteam_cli.population import names, policies
 from berteam_cli.stored import stored_config
+from berteam_cli.trust import trusted
 from berteam_cli.workers import Workers
 from mctf.film import Film, filmed
 from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIED
@@ -75,7 +76,7 @@ def replay(config: ReplayConfig, text: str, out: Path | None) -> float:
             write_whole(path, lambda part: write_page(film, part, steering, match.title))
         else:
             write_whole(path, lambda part: write_gif(film, part))
-    print(f"{match.title}.", ending(film), *files.values(), sep="\n")
+    print(shown(f"{match.title}."), ending(film), *(shown(str(path)) for path in files.values()), sep="\n")
     return math.nan
 
 
@@ -128,7 +129,7 @@ def of_run(config: ReplayConfig, folder: Path) -> Match:
         RunError: it has no checkpoint.
     """
     read_manifest(folder)
-    parts = build.parts_to_read(checked(stored_config(folder)))
+    parts = build.parts_to_read(checked(stored_config(folder, trusted(config.trust))))
     game = filmable(parts.games.env)
     run = checkpoint.load(folder, parts).run
     population, islands = run.population, parts.optimizer.islands

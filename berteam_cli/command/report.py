@@ -7,13 +7,14 @@ from functools import partial
 from pathlib import Path
 
 from berteam_cli.config_commands import ReportConfig
-from berteam_cli.errors import InputError
+from berteam_cli.errors import InputError, shown
 from berteam_cli.folder import new_folder, write_whole
 from berteam_cli.report import chosen, course, members, overview, page, strength
 from berteam_cli.report.drawing import Plot, check_matplotlib, styled
 from berteam_cli.report.film import best_game
 from berteam_cli.report.page import Report, Section
 from berteam_cli.report.source import Source
+from berteam_cli.trust import trusted
 
 PAGE = "report.html"
 PLOTS = (
@@ -51,7 +52,7 @@ def report(config: ReportConfig, _: str, out: Path | None) -> float:
             else:
                 picture.unlink(missing_ok=True)  # of an earlier report
     write_whole(folder / PAGE, lambda part: part.write_text(text, encoding="utf-8"))
-    print(folder / PAGE)
+    print(shown(str(folder / PAGE)))
     return math.nan
 
 
@@ -70,7 +71,8 @@ def read(config: ReportConfig) -> list[Source]:
         raise InputError(f"The run {twice[0]} is named twice.")
     if config.compare is not None and not overview.is_comparison(Path(config.compare)):
         raise InputError(f"compare={config.compare} is no folder that berteam compare wrote: it has no comparison.csv.")
-    return [Source.of(folder) for folder in folders]
+    trust = trusted(config.trust)
+    return [Source.of(folder, trust) for folder in folders]
 
 
 def place(sources: list[Source]) -> Path:

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from berteam_cli.command.compare import compare
 from berteam_cli.command.evaluate import evaluate
-from berteam_cli.command.inspect import narrow, printed
+from berteam_cli.command.inspect import narrow, plain, printed
 from berteam_cli.command.report import report
 from berteam_cli.command.tournament import tournament
 from berteam_cli.command.train import train
@@ -61,11 +61,14 @@ def reproduce(config: ReproduceConfig, text: str, folder: Path | None = None) ->
         folder: None has outputs/reproduce/<what>_<scale>.
 
     Raises:
-        InputError: the folder holds something else, or matplotlib is missing.
+        InputError: the folder holds something else, the seeds are none, or matplotlib is missing.
         RunError: a part failed.
         KeyboardInterrupt: it was interrupted; the same command goes on.
     """
     folder = folder or Path("outputs", "reproduce", f"{config.what}_{config.scale:g}")
+    seeds = list(config.seeds)
+    if not seeds or len(set(seeds)) < len(seeds) or not all(0 <= seed < 2**63 for seed in seeds):
+        raise InputError(f"seeds must be different whole numbers >= 0 and < 2**63, one at least, but is {seeds}.")
     check_matplotlib()  # which the report needs at the very end
     begin(folder, config, text)
     work = Work(config, folder)
@@ -208,4 +211,4 @@ def show(folder: Path, config: ReproduceConfig) -> None:
     if config.scale < 1:
         console.print("A smaller scale than 1 trains for less than the paper; its numbers are not the paper's.")
     for path in (folder / "paper.csv", folder / "report" / "report.html"):
-        console.print(str(path), highlight=False, soft_wrap=True)
+        console.print(plain(path), highlight=False, soft_wrap=True)

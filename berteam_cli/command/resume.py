@@ -14,6 +14,7 @@ from berteam_cli.config import checked, one_line
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.folder import read_manifest
 from berteam_cli.stored import MAY_CHANGE, stored_config, whole_choice
+from berteam_cli.trust import told
 
 
 def resume(folder: Path, overrides: list[str]) -> float:
@@ -21,14 +22,15 @@ def resume(folder: Path, overrides: list[str]) -> float:
 
     Args:
         folder: of a training run.
-        overrides: ``key=value`` of MAY_CHANGE.
+        overrides: ``key=value`` of MAY_CHANGE, and ``trust=module:function``.
 
     Raises:
         InputError: there is no run, or an override is not allowed.
         RunError: it cannot go on.
     """
     read_manifest(folder)
-    stored = stored_config(folder)
+    trust, overrides = told(overrides)
+    stored = stored_config(folder, trust)
     for override in overrides:
         key, equals, _ = override.partition("=")
         if not equals:
@@ -38,6 +40,12 @@ def resume(folder: Path, overrides: list[str]) -> float:
             raise InputError(
                 f"{key} cannot be changed when a run goes on; {allowed} can.{did_you_mean(key, MAY_CHANGE)}"
             )
+    address = stored.logger.get("tracking")
+    if address is not None and not any(x.startswith(("logger=", "logger.tracking=")) for x in overrides):
+        raise InputError(
+            f"{folder} sends its figures to {address}, which its folder names; if they are to go there, add "
+            f"logger.tracking={address} to the command, else logger=csv."
+        )
     try:
         chosen = [x for x in overrides if x.startswith("logger=")]
         for choice in chosen:

@@ -10,9 +10,9 @@ from typing import Any
 
 import pandas as pd
 
-from berteam_cli.errors import InputError, RunError
+from berteam_cli.errors import InputError, RunError, shown
 from berteam_cli.folder import MANIFEST, Manifest, read_manifest
-from berteam_cli.records import COLUMNS
+from berteam_cli.records import COLUMNS, cell
 
 TABLE = "sweep.csv"
 
@@ -33,7 +33,7 @@ def swept(task: Callable[[], float], folder: Path, overrides: list[str]) -> tupl
         return task(), True
     except (InputError, RunError) as refused:
         error = str(refused)
-        print(f"berteam: job {folder.name} ({' '.join(overrides)}): {error}", flush=True)
+        print(shown(f"berteam: job {folder.name} ({' '.join(overrides)}): {error}"), flush=True)
         return math.nan, False
     finally:
         manifest = Manifest.of(folder) if (folder / MANIFEST).exists() else Manifest.begun(folder, status="refused")
@@ -58,5 +58,5 @@ def write(sweep: Path) -> None:
         rows.append(row | {"error": facts.get("error", "")})
     columns = ["job", "overrides", "status", *COLUMNS["summary"], "error"]
     part = sweep / f"{TABLE}.{os.getpid()}.part"
-    pd.DataFrame(rows, columns=columns).to_csv(part, index=False, lineterminator="\n")
+    pd.DataFrame(rows, columns=columns).map(cell).to_csv(part, index=False, lineterminator="\n")
     os.replace(part, sweep / TABLE)

@@ -60,7 +60,8 @@ def serve(connection: Connection, game: Game) -> None:
     """
     leave_group()
     threading.Thread(target=end_with_parent, daemon=True).start()
-    sys.path.insert(0, game.folder)
+    if game.folder not in sys.path:
+        sys.path.append(game.folder)  # last, so that it hides nothing
     try:
         env = made(game)
         facts = facts_of(env, game.teams)

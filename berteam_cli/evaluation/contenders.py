@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,22 +43,26 @@ class Contender:
     broken: str
 
 
-def contender(folder: Path) -> Contender:
-    """Returns the run in ``folder``.
+def contender(folder: Path, trust: Collection[str]) -> Contender:
+    """Returns the run in ``folder``, whose game may import what ``trust`` names.
 
     Raises:
         InputError: there is none, or it has no checkpoint.
     """
     status = read_manifest(folder)["status"]
-    parts, run = last_state(folder)
+    parts, run = last_state(folder, trust=trust)
     values = flat(OmegaConf.to_container(plain_config(folder)))
     kept = {key: x for key, x in values.items() if key.split(".")[0] not in (*ASIDE, "evaluation")}
     broken = "" if status == "done" else f"{folder} is {status}; it is compared as it was after epoch {run.epoch}"
     return Contender(folder, parts.seed, parts, run, kept, broken)
 
 
-def contenders(folders: list[Path]) -> list[Contender]:
+def contenders(folders: list[Path], trust: Collection[str] = ()) -> list[Contender]:
     """Returns the runs in ``folders``, in an order that their own order does not change.
+
+    Args:
+        folders: of the runs.
+        trust: what their games may import.
 
     Raises:
         InputError: one is no run or there twice, or their games differ.
@@ -69,7 +74,7 @@ def contenders(folders: list[Path]) -> list[Contender]:
         if folder.resolve() in seen:
             raise InputError(f"{folder} is named twice; every run counts once.")
         seen[folder.resolve()] = folder
-    found = [contender(folder) for folder in folders]
+    found = [contender(folder, trust) for folder in folders]
     check_game(found)
     return sorted(found, key=lambda x: (sorted(map(str, x.config.items())), x.seed, str(x.folder)))
 

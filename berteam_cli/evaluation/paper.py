@@ -15,7 +15,7 @@ from scipy.special import stdtrit
 
 from berteam_cli.command.inspect import read_table
 from berteam_cli.rating.bootstrap import Interval
-from berteam_cli.records import EVALUATION
+from berteam_cli.records import EVALUATION, cell
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def compared(quantity: str, found: Reproduced) -> Interval:
     optimizer, selector = pair.split(" and ")
     ours = table(found.comparison, "comparison").set_index("algorithm")
     of = table(found.comparison, "runs").set_index("run").algorithm
-    row = ours.loc[of[str(found.runs[optimizer, selector][0])]]
+    row = ours.loc[of[cell(str(found.runs[optimizer, selector][0]))]]
     if kind == "Elo":
         return interval_of(row, ("mixed_elo", "mixed_elo_low", "mixed_elo_high"))
     return exact(row.epoch_s if kind == "seconds an epoch" else row.update_s)

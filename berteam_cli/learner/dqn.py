@@ -12,6 +12,7 @@ from numpy.random import Generator
 from berteam_cli.acting import GREEDY, Policies, networks
 from berteam_cli.learner.adam import Adam, Trained, untrained
 from berteam_cli.learner.base import Learning
+from berteam_cli.learner.fitting import check_columns
 from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, layers, uniform, weight_count
 from berteam_cli.learner.replay import Replay, empty, remember
@@ -207,9 +208,24 @@ class Dqn:
             column[:, : begun.shape[1]] = begun
         return replay
 
+    def checked(self, tensors: dict[str, Any]) -> dict[str, Any]:
+        """Returns ``tensors`` as arrays.
+
+        Raises:
+            ValueError: they are of other members.
+        """
+        columns = {name: tensor.cpu().numpy() for name, tensor in tensors.items()}
+        one = Dqn.tensors(self, Dqn.init(self, 1, np.random.default_rng(0)))
+        check_columns(columns, {name: tensor.numpy() for name, tensor in one.items()}, self.actions, Replay._fields)
+        return columns
+
     def restored(self, tensors: dict[str, Any]) -> DqnState:
-        """Returns the state that ``tensors`` gave these."""
-        columns = {name: tensor.numpy() for name, tensor in tensors.items()}
+        """Returns the state that ``tensors`` gave these.
+
+        Raises:
+            ValueError: they are of other members.
+        """
+        columns = self.checked(tensors)
         return DqnState(
             Trained(*(columns[name] for name in Trained._fields)),
             columns["target"],

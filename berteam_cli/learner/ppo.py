@@ -14,6 +14,7 @@ from numpy.random import Generator
 from berteam_cli.acting import SAMPLED, Policies, networks
 from berteam_cli.learner.adam import Adam, Trained, untrained
 from berteam_cli.learner.base import Learning
+from berteam_cli.learner.fitting import check_columns
 from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, forward, layers, n_values, orthogonal, weight_count
 from berteam_cli.learner.rollout import Steps, advantages, append, empty, seen, stitched
@@ -213,9 +214,24 @@ class Ppo:
         columns |= {"filled": state.filled, "collected": state.collected}
         return {name: torch.from_numpy(column) for name, column in columns.items()}
 
+    def checked(self, tensors: dict[str, Any]) -> dict[str, Any]:
+        """Returns ``tensors`` as arrays.
+
+        Raises:
+            ValueError: they are of other members.
+        """
+        columns = {name: tensor.cpu().numpy() for name, tensor in tensors.items()}
+        one = Ppo.tensors(self, Ppo.init(self, 1, np.random.default_rng(0)))
+        check_columns(columns, {name: tensor.numpy() for name, tensor in one.items()}, self.actions)
+        return columns
+
     def restored(self, tensors: dict[str, Any]) -> PpoState:
-        """Returns the state that ``tensors`` gave these."""
-        columns = {name: tensor.numpy() for name, tensor in tensors.items()}
+        """Returns the state that ``tensors`` gave these.
+
+        Raises:
+            ValueError: they are of other members.
+        """
+        columns = self.checked(tensors)
         return PpoState(
             Trained(*(columns[name] for name in Trained._fields)),
             Steps(*(columns[name] for name in Steps._fields)),

@@ -155,6 +155,7 @@ class StackedDqn(Dqn):
 
     def restored(self, tensors: dict[str, Any]) -> DqnState:
         """Returns the state that ``tensors`` gave these, on the device."""
+        self.checked(tensors)
         replay = self.whole({name: tensors[name].cpu().numpy() for name in Replay._fields})
         return DqnState(
             Trained._make(tensors[name].to(self.device, copy=True) for name in Trained._fields),

@@ -168,6 +168,7 @@ class StackedPpo(Ppo):
 
     def restored(self, tensors: dict[str, Any]) -> PpoState:
         """Returns the state that ``tensors`` gave these, on the device."""
+        self.checked(tensors)
         return PpoState(
             Trained._make(tensors[name].to(self.device, copy=True) for name in Trained._fields),
             Steps._make(tensors[name].to(self.device, copy=True) for name in Steps._fields),

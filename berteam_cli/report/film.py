@@ -38,7 +38,7 @@ def best_game(source: Source, seed: int) -> Replay:
         return Replay(title, "There is no checkpoint to play from: only training runs have one.")
     blue, red = source.elo.team[:2]
     try:
-        asked = ReplayConfig(run=str(source.folder), blue=blue, red=red, seed=seed)
+        asked = ReplayConfig(run=str(source.folder), trust=source.trust, blue=blue, red=red, seed=seed)
         match: Match = of_run(asked, source.folder)
         film = checked_film(match.env, *played(match, seed))
     except (InputError, RunError) as error:

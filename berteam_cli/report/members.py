@@ -133,7 +133,7 @@ def vectors(source: Source) -> Floats | str:
     if not (source.folder / "checkpoint").exists():
         return "There is no checkpoint to read the selector from: berteam train writes it."
     try:
-        parts, run = last_state(source.folder)
+        parts, run = last_state(source.folder, trust=source.trust)
     except (InputError, RunError) as error:
         return f"The selector cannot be read: {error}"
     if not isinstance(parts.selector, Embedding):

@@ -29,19 +29,21 @@ class Source:
     Attributes:
         folder: of the run.
         manifest: as it stands there.
+        trust: what the run's game may import.
     """
 
     folder: Path
     manifest: dict[str, Any]
+    trust: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, folder: Path) -> Source:
-        """Returns the run in ``folder``.
+    def of(cls, folder: Path, trust: tuple[str, ...] = ()) -> Source:
+        """Returns the run in ``folder``, whose game may import what ``trust`` names.
 
         Raises:
             InputError: there is none.
         """
-        return cls(folder, read_manifest(folder))
+        return cls(folder, read_manifest(folder), trust)
 
     @property
     def whole(self) -> bool:

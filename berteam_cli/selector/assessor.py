@@ -24,7 +24,7 @@ from berteam_cli.selector.base import Selecting
 from berteam_cli.selector.listed import Listed, Mixture, every_team, fresh, new_among
 from berteam_cli.selector.network import seeded
 from berteam_cli.selector.outcome_network import OutcomeNetwork, foretold
-from berteam_cli.selector.updates import Learnt, check_minibatches, restored, untrained, updated
+from berteam_cli.selector.updates import Learnt, check_minibatches, check_weights, restored, untrained, updated
 from berteam_cli.tensors import below
 
 CPU = torch.device("cpu")
@@ -150,9 +150,15 @@ class Assessor(Listed):
         return named | {name: torch.from_numpy(array) for name, array in arrays.items()}
 
     def restored(self, tensors: dict[str, Any]) -> AssessorState:
-        """Returns the state that ``tensors`` gave these."""
+        """Returns the state that ``tensors`` gave these.
+
+        Raises:
+            ValueError: they are of another network.
+        """
+        learnt = restored(below(tensors, "learnt."), "cpu")
+        check_weights([learnt], self._network)
         return AssessorState(
-            restored(below(tensors, "learnt."), "cpu"),
+            learnt,
             Games(tensors["ring.teams"].numpy(), tensors["ring.scores"].numpy()),
             int(tensors["pushed"]),
             Mixture(tensors["will.teams"].numpy(), tensors["will.probability"].numpy()),

@@ -21,7 +21,7 @@ from berteam_cli.selector.embedders import Embedder, embedder
 from berteam_cli.selector.masking import masking_loss
 from berteam_cli.selector.network import LONGEST, POSITIONS, TeamNetwork, seeded
 from berteam_cli.selector.observations import Looking, Seen, nothing_seen, seen_in
-from berteam_cli.selector.updates import check_minibatches, untrained, updated
+from berteam_cli.selector.updates import check_minibatches, check_weights, untrained, updated
 from berteam_cli.selector.winners import Examples, Winners, harvest, in_parts, minibatch, no_winners, pushed
 
 CPU = torch.device("cpu")
@@ -222,8 +222,14 @@ class BerteamLearning(Plain):
         return state.tensors()
 
     def restored(self, tensors: dict[str, Any]) -> BerteamState:
-        """Returns the state that ``tensors`` gave these."""
-        return restored(tensors, self.device)
+        """Returns the state that ``tensors`` gave these.
+
+        Raises:
+            ValueError: they are of another network.
+        """
+        state = restored(tensors, self.device)
+        check_weights(state.learnt, self._network)
+        return state
 
     @cached_property
     def _network(self) -> TeamNetwork:

@@ -53,6 +53,20 @@ def restored(tensors: dict[str, Tensor], device: str) -> Learnt:
     return Learnt(**kinds, steps=int(tensors["steps"]))
 
 
+def check_weights(learnt: Iterable[Learnt], network: nn.Module) -> None:
+    """Checks that what was learnt is of ``network``.
+
+    Raises:
+        ValueError: it is of another one.
+    """
+    kinds = {name: (value.shape, value.dtype) for name, value in network.named_parameters()}
+    for one in learnt:
+        for kind in KINDS:
+            held = getattr(one, kind)
+            if (held or kind != "averages") and {name: (x.shape, x.dtype) for name, x in held.items()} != kinds:
+                raise ValueError(f"its selector's {kind} are of another network")
+
+
 def untrained(network: nn.Module, device: torch.device) -> Learnt:
     """Returns the weights of ``network`` on ``device`` before the first step."""
     weights = {name: value.detach().to(device, copy=True) for name, value in network.named_parameters()}

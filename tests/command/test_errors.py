@@ -1,8 +1,11 @@
 """Wrong input: one sentence with what is right, exit code 2, nothing left behind."""
 
-import re
+import random
 
 import pytest
+
+from tests.wrong import SEED, Wrong, cases
+from tests.wrong.refusal import fault, ran
 
 SB3 = ("train", "population=ppo6", "learner=sb3")
 
@@ -169,13 +172,28 @@ CASES = {
 
 
 @pytest.mark.parametrize(("words", "said"), CASES.items(), ids=" ".join)
-def test_wrong_input(words, said, tmp_path, berteam):
-    error = berteam(*words, code=2).stderr
-    assert re.search(said, error), error
-    assert error.count("\n") == 1, error
-    assert error.startswith("berteam: ")
-    assert "Traceback" not in error
-    assert list(tmp_path.iterdir()) == []
+def test_wrong_input(words, said):
+    assert fault(Wrong("case", words, said)) is None
+
+
+MADE = 60  # `make faults` takes all of them
+
+
+@pytest.fixture(scope="module")
+def made():
+    return random.Random(SEED).sample(cases(), MADE)
+
+
+@pytest.mark.parametrize("k", range(MADE))
+def test_wrong_input_that_a_generator_made(k, made):
+    assert fault(made[k]) is None
+
+
+def test_what_is_right_is_not_refused():
+    code, out, err = ran(("train", "selector=mcaa", "seed=3", "--cfg", "job"))
+    assert (code, err) == (0, "")
+    assert "seed: 3" in out
+    assert fault(Wrong("right", ("--version",), ".")) == "[right] berteam '--version': it ended with 0"
 
 
 def test_as_a_process(process, tmp_path):

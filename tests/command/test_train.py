@@ -367,7 +367,7 @@ def test_a_reward_of_ones_own_lies_in_the_current_folder(process, tmp_path):
     losses = [read(tmp_path / run, "learning").loss.dropna() for run in ("mine", "sparse")]
     assert len(losses[0]) == len(losses[1]) > 0
     assert not losses[0].equals(losses[1])
-    process("resume", "mine", "epochs=5")
+    process("resume", "mine", "epochs=5", "trust=mine:pay")
 
 
 def test_a_reward_that_is_no_number_ends_the_run(process, tmp_path):

@@ -48,7 +48,7 @@ def test_train_resume_and_tournament(berteam, tmp_path):
     for workers in (1, 2):
         assert berteam(*RUN, *SMALL, *PPO, f"workers={workers}", f"out=w{workers}")[0] == 0
     assert berteam(*RUN, *SMALL, *PPO, "out=parts", "epochs=1")[0] == 0
-    assert berteam("resume", "parts", "epochs=2")[0] == 0
+    assert berteam("resume", "parts", "epochs=2", "trust=own:Contest")[0] == 0
     for name in UNTIMED:
         whole = (tmp_path / "w1" / f"{name}.csv").read_bytes()
         assert whole == (tmp_path / "w2" / f"{name}.csv").read_bytes(), name
@@ -58,7 +58,7 @@ def test_train_resume_and_tournament(berteam, tmp_path):
     assert learning.steps.sum() == 8 * (3 + 3 * 6)  # one of four dies after three steps
     assert (learning.updates > 0).any()
     assert len(read(tmp_path / "w1", "elo")) > 0
-    assert berteam("tournament", "run=w1", "out=t", "top=3", "games_per_pair=2")[0] == 0
+    assert berteam("tournament", "run=w1", "trust=own:Contest", "out=t", "top=3", "games_per_pair=2")[0] == 0
     assert len(pd.read_csv(tmp_path / "t" / "games.csv")) == 6
 
 
