@@ -51,7 +51,11 @@ SELECTORS: dict[str, Callable[..., Selector[Any]]] = {
     "assessor": Assessor,
     "psro": Psro,
 }
-OPTIMIZERS: dict[str, type[Fixed]] = {"fixed": Fixed, "coevolution": Coevolution, "mapelites": MapElites}
+OPTIMIZERS: dict[str, type[Fixed]] = {
+    "fixed": Fixed,
+    "coevolution": Coevolution,
+    "mapelites": MapElites,
+}
 
 
 def games(config: CommandConfig) -> Games:
