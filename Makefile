@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: help setup demo test lint bench check picture reference clean
+.PHONY: help setup demo test lint bench check docs picture reference clean
 
 help: ## what can be made
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -32,6 +32,9 @@ bench: setup ## speed: figures, targets and ratios
 
 check: setup ## replays the recorded games
 	$(BIN)/python -m mctf.check tests/traces/*.npz tests/traces/*.csv
+
+docs: setup ## the page of every config key
+	$(BIN)/python docs/config_reference.py docs/config.md
 
 picture: setup ## the pictures of the README and docs
 	$(BIN)/berteam train experiment=paper_fixed out=outputs/picture on_exists=overwrite

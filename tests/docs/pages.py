@@ -6,6 +6,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+SHELL = ("", "sh", "bash")
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,17 @@ class Block:
     def text(self):
         return "\n".join(self.lines) + "\n"
 
+    @property
+    def file(self):
+        """The path that its first line names, in a comment; None where it names none."""
+        named = re.fullmatch(r"# ([\w./]+\.(?:py|yaml))", self.lines[0])
+        return named and named[1]
+
+    @property
+    def commands(self):
+        """Its lines that begin with berteam or make."""
+        return called(self.lines) if self.language in SHELL else []
+
 
 def blocks(page):
     """Returns the fenced blocks of ``page``, a path."""
@@ -45,14 +57,13 @@ def blocks(page):
     return found
 
 
-def outside_blocks(page):
-    """Returns the text of ``page`` without its fenced blocks."""
-    return re.sub(r"^\s*```.*?^\s*```", "", page.read_text(), flags=re.S | re.M)
+def inline_commands(page):
+    """Returns the command lines that stand in the sentences of ``page``."""
+    sentences = re.sub(r"^\s*```.*?^\s*```", "", page.read_text(), flags=re.S | re.M)
+    return called(re.findall(r"(?<!`)`([^`\n]+(?:\n[^`\n]+)?)`(?!`)", sentences))
 
 
-def command_lines(page):
-    """Returns the command lines of ``page`` in order, those in blocks first: whatever begins with berteam or make."""
-    shown = [line for block in blocks(page) if block.language in ("", "sh", "bash") for line in block.lines]
-    shown += re.findall(r"`([^`]+)`", outside_blocks(page))
-    lines = [re.sub(r"\s+#.*", "", line).strip().removeprefix("$ ") for line in shown]
-    return [line for line in lines if re.match(r"(berteam|make)( |$)", line)]
+def called(lines):
+    """Returns those of ``lines`` that begin with berteam or make, without comments."""
+    plain = [" ".join(re.sub(r"\s+#.*", "", line).split()).removeprefix("$ ") for line in lines]
+    return [line for line in plain if re.match(r"(berteam|make)( |$)", line)]

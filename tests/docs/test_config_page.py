@@ -39,7 +39,7 @@ def test_every_key_of_every_choice_is_there(group):
                 PAGE.partition(f"### {group}={based[1]}\n")[2].partition("\n##")[0],
                 flags=re.M,
             )
-        known = [x for x in keys(composed(f"{group}={choice}")[group]) if x != "name"]
+        known = [x for x in keys(composed(command=f"{group}/{choice}")[group]) if x != "name"]
         leaves = {x for x in known if not any(y.startswith(f"{x}.") for y in known)}
         assert set(told) == leaves
 

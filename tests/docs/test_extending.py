@@ -53,13 +53,11 @@ def placed(block, folder):
     if block.language == "diff":
         path = folder / first.removeprefix("--- ")
         path.write_text(added(path.read_text(), rest))
-    elif first.startswith("# ") and first.endswith((".py", ".yaml")):
-        path = folder / first.removeprefix("# ")
+    elif block.file:
+        path = folder / block.file
         assert not path.exists()
         path.write_text("\n".join(rest) + "\n")
-    else:
-        return False
-    return True
+    return bool(block.file) or block.language == "diff"
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +94,7 @@ def test_the_examples_are_well_formed(clone):
 
 def trainings(section):
     """Returns the command lines of a section that train."""
-    lines = [x for b in blocks(PAGE) if b.section == section and b.language == "sh" for x in b.lines]
+    lines = [line for block in blocks(PAGE) if block.section == section for line in block.commands]
     return [line for line in lines if line.startswith("berteam train ")]
 
 
