@@ -20,7 +20,13 @@ LESS = {
     "train": SMALL,
     "resume": ["epochs=4"],
     "tournament": ["games_per_pair=2"],
-    "evaluate": ["games_per_pair=1", "aggression_games=1", "replay_games=1", "payoff_games=2", "teams_at_most=4"],
+    "evaluate": [
+        "games_per_pair=1",
+        "aggression_games=1",
+        "replay_games=1",
+        "payoff_games=2",
+        *("teams_at_most=4", "reference_teams=4"),
+    ],
     "compare": ["games=8", "reference_games=8", "reference_teams=2"],
 }
 """What is said behind the line of each command, and so in place of what the line itself says of these keys."""
@@ -44,10 +50,12 @@ MADE = "make: sets up environments, or runs what takes minutes, these tests amon
 
 CHECKED = {
     r"train .*seed=0,1,2": "a sweep of many runs",
-    r"train .*experiment=paper_": "a population of the paper's size takes its time to set up, whatever the epochs",
     r"reproduce ": "tests/command/test_reproduce.py runs it at a small scale, and it has no smaller one",
 }
 """Lines that are composed and checked as a whole, as the command does before it begins, but not run; and why."""
+
+RUN_ON = {"README.md", "tutorial.md"}
+"""Pages whose trainings are run. Those of other pages differ from them in values alone, which are checked."""
 
 NAMED = "a command's name alone, in a sentence"
 
@@ -107,8 +115,10 @@ def test_what_a_page_shows_runs(page, runs, berteam, tmp_path):
             subprocess.run(["make", "-n", *words], cwd=ROOT, check=True, capture_output=True)
         elif kind == "sentence" and len(words) < 2 and (not words or words[0] in set(cli.WORDS) - {"list", "doctor"}):
             continue  # NAMED
-        elif any(re.match(pattern, said) for pattern in CHECKED):
+        elif any(re.match(pattern, said) for pattern in CHECKED) or (words[0] == "train" and page.name not in RUN_ON):
             checked(*words)
+            for out in re.findall(r"\bout=(\S+)", said):
+                shutil.copytree(runs / "of_page", tmp_path / out)
         else:
             less = [] if {"--help", "--cfg"} & set(words) else LESS.get(words[0], [])
             berteam(*words, *less, *(["evaluation.games=112"] if re.search(RATED, said) and less is SMALL else []))
