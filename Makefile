@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: help setup demo test lint coverage hooks faults bench check picture reference clean
+.PHONY: help setup demo test lint coverage hooks faults bench check docs picture reference clean
 
 help: ## what can be made
 	@grep -hE '^[a-zA-Z0-9_-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -44,6 +44,9 @@ bench: setup ## speed: figures, targets and ratios
 
 check: setup ## replays the recorded games
 	$(BIN)/python -m mctf.check tests/traces/*.npz tests/traces/*.csv
+
+docs: setup ## the page of every config key
+	$(BIN)/python docs/config_reference.py docs/config.md
 
 picture: setup ## the pictures of the README and docs
 	$(BIN)/berteam train experiment=paper_fixed out=outputs/picture on_exists=overwrite

@@ -52,6 +52,11 @@ SELECTORS: dict[str, Callable[..., Selector[Any]]] = {
     "assessor": Assessor,
     "psro": Psro,
 }
+OPTIMIZERS: dict[str, type[Fixed]] = {
+    "fixed": Fixed,
+    "coevolution": Coevolution,
+    "mapelites": MapElites,
+}
 
 
 def games(config: CommandConfig) -> Games:
@@ -193,15 +198,15 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
         InputError: its settings do not go together.
     """
     settings = asdict(config.optimizer)
-    name = settings.pop("name")
+    chosen = OPTIMIZERS[settings.pop("name")]
     rule = fitness_rule(config.optimizer, config.selector.name, playing.env.sides)
     for used in ("fitness", "captain_k", "member_k", "average_rate"):
         settings.pop(used)
-    if name == "fixed":
-        return Fixed(islands, rule)
-    if name == "coevolution":
-        return Coevolution(islands, rule, playing.workers, **settings)
-    names = settings.pop("opponents") or list(playing.env.fixed_policies[: playing.env.standard_policies])
-    check_policies(names, playing.env, "optimizer.opponents, or optimizer.opponents=[] for the standard ones,")
-    indices = tuple(playing.env.fixed_policies.index(x) for x in names)
-    return MapElites(islands, rule, playing.workers, opponents=opponents(indices, config.team_size), **settings)
+    if chosen.learns:
+        settings["workers"] = playing.workers
+    if "opponents" in settings:
+        names = settings["opponents"] or list(playing.env.fixed_policies[: playing.env.standard_policies])
+        check_policies(names, playing.env, "optimizer.opponents, or optimizer.opponents=[] for the standard ones,")
+        indices = tuple(playing.env.fixed_policies.index(x) for x in names)
+        settings["opponents"] = opponents(indices, config.team_size)
+    return chosen(islands, rule, **settings)

@@ -1,0 +1,3 @@
+"""The real command, as in tests/command."""
+
+from tests.command.conftest import berteam  # noqa: F401
