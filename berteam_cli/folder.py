@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from berteam_cli.errors import InputError, RunError
+from berteam_cli.quiet import written
 from berteam_cli.records import COLUMNS, EVALUATION, SHEET_ENDINGS, SHEETS
+from berteam_cli.terminal import Printed
 
 MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
 PACKAGES = ("berteam-cli", "torch", "numpy", "numba", "pandas", "stable-baselines3", "pettingzoo", "hydra-core")
@@ -198,14 +200,15 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 @contextmanager
 def logging_to(folder: Path) -> Iterator[None]:
-    """Sends the log to the terminal and, with times, to the folder's log.txt."""
+    """Sends the log to the terminal and, with times, to the folder's log.txt; the folder is its first line."""
     file = logging.FileHandler(folder / LOG, encoding="utf-8")
     file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-    terminal = logging.StreamHandler(sys.stdout)
-    terminal.setFormatter(logging.Formatter("%(message)s"))
+    terminal = Printed()
     log.setLevel(logging.INFO)
     log.propagate = False
     log.handlers = [file, terminal]
+    written(folder)
+    log.info("%s", folder)
     try:
         yield
     finally:
