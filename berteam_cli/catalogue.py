@@ -82,7 +82,7 @@ def whole(group: str, option: str) -> dict[str, Any]:
 
 
 def defaults(content: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Takes the defaults list out of a yaml file's ``content``; yields group and option, "" for the file's own group."""
+    """Takes the defaults list out of a yaml file's ``content``; yields group, "" for the file's own, and option."""
     for entry in content.pop("defaults", []):
         if isinstance(entry, dict):
             yield from ((str(group), str(option)) for group, option in entry.items())

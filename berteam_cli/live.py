@@ -62,7 +62,7 @@ class View:
         }
 
     def best(self) -> tuple[str, str]:
-        """Returns what the fitness of members is, and that of the fittest; nobody is rated against others before the end."""
+        """Returns what members are rated by while they train, and the fittest by that."""
         rule, people = self.parts.optimizer.fitness, self.run.population
         elo = isinstance(rule, CaptainElo)
         label = "best Elo" if elo else "best mean score"

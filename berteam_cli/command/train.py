@@ -16,8 +16,8 @@ from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder
-from berteam_cli.logger.base import Once
 from berteam_cli.live import View, shown
+from berteam_cli.logger.base import Once
 from berteam_cli.logger.opening import check_logger, figures_of, logger
 from berteam_cli.memory import spoken, state_bytes
 from berteam_cli.pace import Pace
