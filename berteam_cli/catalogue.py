@@ -51,7 +51,7 @@ def keys(command: str, chosen: Mapping[str, str]) -> dict[str, bool]:
     if not path.exists():
         return {}
     content = read(path)
-    taken = dict(entry for entry in defaults(content) if entry[0] in groups())
+    taken = dict(entry for entry in defaults(content) if entry[0] in groups() and entry[0] != "experiment")
     experiment = chosen.get("experiment", "")
     if experiment in choices("experiment"):
         changed = read(CONF / "experiment" / f"{experiment}.yaml")

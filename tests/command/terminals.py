@@ -3,6 +3,7 @@
 import fcntl
 import os
 import pty
+import select
 import signal
 import struct
 import subprocess
@@ -50,7 +51,9 @@ class Terminal:
         return "\n".join(self.lines).strip()
 
     def read(self):
-        """Takes what there is; returns whether more may come. Each new sight is kept in ``seen``."""
+        """Takes what there is, or waits a second; returns whether more may come. Each sight is kept in ``seen``."""
+        if not select.select([self.master], [], [], 1)[0]:
+            return True
         try:
             found = os.read(self.master, 65536)
         except OSError:  # Linux says EIO when nobody has the other end any more
