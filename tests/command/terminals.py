@@ -32,7 +32,7 @@ class Terminal:
             stderr=slave,
             start_new_session=True,
             env=clean | {"TERM": "xterm-256color"} | environment,
-            preexec_fn=lambda: begun(ignored),
+            preexec_fn=lambda: begun(ignored),  # noqa: PLW1509 (no threads run yet)
         )
         os.close(slave)
         self.screen = pyte.HistoryScreen(columns, LINES, history=1000)
@@ -63,7 +63,7 @@ class Terminal:
         self.seen.append("\n".join(self.screen.display))
         return bool(found)
 
-    def until(self, wanted, seconds=60):
+    def until(self, wanted, seconds=30):
         """Reads until ``wanted`` stands there."""
         ends = time.monotonic() + seconds
         while wanted not in self.text:

@@ -128,14 +128,14 @@ def test_bash_at_the_prompt(folder):
     try:
         there.type('eval "$(berteam completion bash)"; echo read""y\n')
         there.until("ready")
-        there.type("echo berteam; berteam tra\t")
-        there.until("berteam train ")
+        there.type("berteam tra\t")
+        there.until("berteam train")
         there.type("selector=mc\t")
-        there.until("train selector=mcaa ")
+        there.until("berteam train selector=mcaa")
         there.type("selector.top\t")
         there.until("selector.top_fraction=")
         there.type("1 \x15berteam evaluate outputs/train/o\t")
-        there.until("berteam evaluate outputs/train/one ")
+        there.until("berteam evaluate outputs/train/one")
     finally:
         there.close()
 
@@ -147,21 +147,23 @@ def test_zsh_at_the_prompt(folder):
         there.type('autoload -U compinit; compinit -u -D; eval "$(berteam completion zsh)"; echo read""y\n')
         there.until("ready")
         there.type("berteam tra\t")
-        there.until("berteam train ")
+        there.until("berteam train")
         there.type("selector=mc\t")
-        there.until("train selector=mcaa ")
+        there.until("berteam train selector=mcaa")
         there.type("selector.top\t")
         there.until("selector.top_fraction=")
         there.type("1 \x15berteam list l\t")
         there.until("tensorboard, wandb")
         there.type("\x15berteam evaluate outputs/train/o\t")
-        there.until("berteam evaluate outputs/train/one ")
+        there.until("berteam evaluate outputs/train/one")
     finally:
         there.close()
 
 
 @needs("fish")
-@pytest.mark.parametrize("line", ["berteam tr", "berteam train selector=m", "berteam train sel", "berteam evaluate out"])
+@pytest.mark.parametrize(
+    "line", ["berteam tr", "berteam train selector=m", "berteam train sel", "berteam evaluate out"]
+)
 def test_fish(line, folder):
     program = f"berteam completion fish | source; complete -C {line!r}"
     done = subprocess.run(

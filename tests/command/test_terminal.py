@@ -12,7 +12,14 @@ from tests.command.conftest import BERTEAM
 from tests.command.terminals import berteam_on
 
 RPS = ["train", "env=rps", "population=ppo6", "selector=mcaa", "learner.n_steps=16", "learner.minibatch_size=8"]
-RPS += ["optimizer.protect_new=2", "optimizer.fitness=elo", "optimizer.member_k=1", "record_every=2", "evaluation.games=100", "workers=1"]
+RPS += [
+    "optimizer.protect_new=2",
+    "optimizer.fitness=elo",
+    "optimizer.member_k=1",
+    "record_every=2",
+    "evaluation.games=100",
+    "workers=1",
+]
 PLAIN = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "evaluation.games=100"]
 COLOR = re.compile(rb"\x1b\[(?:\d+;)*[34]\d(?:;\d+)*m")
 NAMES = ["epoch", "games", "time left", "best Elo", "effective teams", "favourite team", "replacements"]
