@@ -50,8 +50,8 @@ def keys(command: str, chosen: Mapping[str, str]) -> dict[str, bool]:
     path = CONF / f"{command}.yaml"
     if not path.exists():
         return {}
-    content = read(path)
-    taken = dict(entry for entry in defaults(content) if entry[0] in groups() and entry[0] != "experiment")
+    content, there = read(path), set(groups()) - {"experiment"}
+    taken = dict(entry for entry in defaults(content) if entry[0] in there)
     experiment = chosen.get("experiment", "")
     if experiment in choices("experiment"):
         changed = read(CONF / "experiment" / f"{experiment}.yaml")

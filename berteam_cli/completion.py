@@ -102,10 +102,10 @@ def keys(command: str, given: list[str], begun: str) -> Answers:
     yield from ((key, "") for key in KEYS.get(command, ()))
     chosen = dict(word.split("=", maxsplit=1) for word in given if "=" in word)
     known = catalogue.keys(command, chosen)
-    level = begun.count(".")
+    level, groups = begun.count("."), catalogue.groups()
     for key, inner in known.items():
         if key.count(".") == level:
-            if key in catalogue.groups():
+            if key in groups:
                 yield f"{key}=", ", ".join(catalogue.choices(key))
             yield (f"{key}.", "keys below") if inner else (f"{key}=", "")
     if command == "train" and not level:
