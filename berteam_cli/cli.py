@@ -8,15 +8,17 @@ from __future__ import annotations
 import argparse
 import errno
 import importlib
+import io
 import itertools
 import os
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from berteam_cli import __version__
+from berteam_cli import __version__, quiet
 from berteam_cli.errors import InputError, RunError, did_you_mean, sentence
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ WORDS = {
     "report": "runs as one page for the browser",
     "inspect": "the tables of a run in the terminal",
     "list": "what can be chosen",
+    "doctor": "whether all is well here: versions, cores, device, kernels, space",
+    "completion": "a script for bash, zsh or fish that completes the words of berteam",
 }
 
 HELP = f"""berteam {__version__}: chooses which learning agents should play together.
@@ -44,14 +48,22 @@ HELP = f"""berteam {__version__}: chooses which learning agents should play toge
   berteam train -m selector=berteam,mcaa optimizer=coevolution,mapelites seed=0,1,2
   berteam inspect outputs/train/...
 
-Commands (each has --help):
+Commands (each has --help; with -q nothing but errors, and at last the folder):
 {chr(10).join(f"  {word:<11} {does}" for word, does in WORDS.items())}
 """
 
 
 def main() -> None:
     """Runs the command line and exits with its code."""
-    words = sys.argv[1:]
+    if sys.argv[1:2] == ["--complete"]:
+        from berteam_cli.completion import answer  # noqa: PLC0415 (start-up: each command imports what it needs)
+
+        answer(sys.argv[2:], WORDS)
+        return
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a name that the terminal cannot show ends no run
+    words = [word for word in sys.argv[1:] if word not in quiet.WORDS]
+    silent = len(words) < len(sys.argv[1:]) and not {"-h", "--help"} & set(words)
     if not words or words[0] in {"-h", "--help"}:
         print(HELP)
         sys.exit(0)
@@ -60,7 +72,8 @@ def main() -> None:
         sys.exit(0)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's way to say Ctrl-C
     try:
-        run(words[0], words[1:])
+        with quiet.hushed() if silent else nullcontext():
+            run(words[0], words[1:])
     except (InputError, RunError) as error:
         refuse(error)
     except KeyboardInterrupt:
@@ -84,6 +97,7 @@ def run(word: str, words: list[str]) -> None:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
     commands = {"train": training, "tournament": composed}
     commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing}
+    commands |= {"doctor": doctor, "completion": completion}
     commands.get(word, about)(word, words)
 
 
@@ -104,17 +118,19 @@ def training(word: str, words: list[str]) -> None:
 
 def composed(word: str, words: list[str]) -> None:
     """Runs a command whose config Hydra composes."""
+    if {"-h", "--help"} & set(words):
+        from berteam_cli.catalogue import help_text  # noqa: PLC0415 (as below)
+
+        print(help_text(word))
+        return
     import hydra  # noqa: PLC0415 (start-up: each command imports what it needs)
 
-    from berteam_cli.compose import arguments, check, help_text, prepare, spelt_out  # noqa: PLC0415
+    from berteam_cli.compose import arguments, check, prepare, spelt_out  # noqa: PLC0415
 
     prepare()
     words = spelt_out(words)
     Sweeps.failed, Sweeps.table = 0, None
     given = arguments(words)
-    if given.help:
-        print(help_text(word))
-        return
     if not (given.hydra_help or given.shell_completion):
         check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
     sys.argv = [f"berteam {word}", *words]
@@ -192,6 +208,7 @@ def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) 
             refuse(error)
     folder = Path(HydraConfig.get().runtime.output_dir)
     Sweeps.table = folder.parent / TABLE
+    quiet.written(folder.parent)
     figure, ok = swept(lambda: command(config, text, folder), folder, list(HydraConfig.get().overrides.task))
     Sweeps.failed += not ok
     return figure
@@ -295,3 +312,21 @@ def listing(word: str, words: list[str]) -> None:
     from berteam_cli.command.listing import show  # noqa: PLC0415
 
     show(given.group)
+
+
+def doctor(word: str, words: list[str]) -> None:
+    """Tells whether all is well here."""
+    given = reader(word, words, __json={"action": "store_true", "help": "as JSON"})
+    from berteam_cli.command.doctor import doctor as examine  # noqa: PLC0415
+
+    examine(as_json=given.json)
+
+
+def completion(word: str, words: list[str]) -> None:
+    """Prints a script that completes the words of berteam."""
+    from berteam_cli.completion import SCRIPTS  # noqa: PLC0415
+
+    given = reader(word, words, shell={"help": f"{', '.join(SCRIPTS)}"})
+    if given.shell not in SCRIPTS:
+        raise InputError.choice("shell", given.shell, SCRIPTS)
+    print(SCRIPTS[given.shell])

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import functools
-import importlib.resources
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import yaml
 from hydra import compose, initialize_config_module
 from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
@@ -19,11 +17,11 @@ from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from berteam_cli.catalogue import groups
 from berteam_cli.config import checked, one_line, register
 from berteam_cli.errors import InputError, did_you_mean
 
 CONF = "berteam_cli.conf"
-HIDDEN = ("schema", "hydra")  # groups no user chooses from
 REFUSALS = (HydraException, OmegaConfBaseException, OSError, OverflowError, ValueError, RecursionError)
 """What composing raises: the first two say what is wrong, the others come of numbers and names that are too long."""
 
@@ -49,6 +47,7 @@ def arguments(words: list[str]) -> Any:
         InputError: it has a flag that does not exist.
     """
     parser = get_args_parser()
+    parser.allow_abbrev = False  # one name for each flag
 
     def refuse(message: str) -> None:
         raise InputError(f"{message}; see --help.")
@@ -263,23 +262,10 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
         return []
 
 
-def groups() -> list[str]:
-    """Returns the config groups a user chooses from."""
-    return [x for x in all_groups() if x not in HIDDEN]
-
-
 @functools.cache
 def all_groups() -> list[str]:
     """Returns the config groups of the package and of Hydra."""
     return sorted(GlobalHydra.instance().config_loader().list_groups(""))
-
-
-def help_text(command: str) -> str:
-    """Returns what ``--help`` prints: the template in the command's yaml, with the choices of each group."""
-    text = importlib.resources.files(CONF).joinpath(f"{command}.yaml").read_text(encoding="utf-8")
-    with initialize_config_module(CONF, version_base="1.3", job_name=command):
-        lines = [f"  {group}: {', '.join(choices(group))}" for group in groups()]
-    return str(yaml.safe_load(text)["hydra"]["help"]["template"]).replace("$APP_CONFIG_GROUPS", "\n".join(lines))
 
 
 def check_keys(command: str, searched: list[str], overrides: list[Override]) -> None:

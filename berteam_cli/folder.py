@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Any
 
 from berteam_cli.errors import InputError, RunError, shown
+from berteam_cli.quiet import written
 from berteam_cli.records import COLUMNS, EVALUATION, SHEET_ENDINGS, SHEETS
+from berteam_cli.terminal import Printed
 
 MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
 PACKAGES = ("berteam-cli", "torch", "numpy", "numba", "pandas", "stable-baselines3", "pettingzoo", "hydra-core")
@@ -219,6 +221,8 @@ class Lines(logging.FileHandler):
 
     def handleError(self, record: logging.LogRecord) -> None:
         """Does nothing."""
+
+
 FACTS = {"status": str, "started": str, "command": list, "resumed": list, "overrides": list, "error": str}
 """Kinds of what commands read of a manifest."""
 INSIDE = ("checkpoint", EVALUATION, "report", "replay", "tensorboard", "mlflow", "wandb")
@@ -253,14 +257,15 @@ class Plain(logging.Formatter):
 
 @contextmanager
 def logging_to(folder: Path) -> Iterator[None]:
-    """Sends the log to the terminal and, with times, to the folder's log.txt."""
+    """Sends the log to the terminal and, with times, to the folder's log.txt; the folder is its first line."""
     file = Lines(folder / LOG, encoding="utf-8")
     file.setFormatter(Plain("%(asctime)s %(levelname)s %(message)s"))
-    terminal = logging.StreamHandler(sys.stdout)
-    terminal.setFormatter(Plain("%(message)s"))
+    terminal = Printed()
     log.setLevel(logging.INFO)
     log.propagate = False
     log.handlers = [file, terminal]
+    written(folder)
+    log.info("%s", folder)
     try:
         yield
     finally:

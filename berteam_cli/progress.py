@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from berteam_cli.pace import spoken
+from berteam_cli.terminal import console, interactive
 
 log = logging.getLogger("berteam")
 
@@ -29,8 +29,7 @@ def progress(title: str, total: int, unit: str = "games") -> Iterator[Callable[[
         total: units of it.
         unit: what they are, in the plural.
     """
-    console = Console()
-    teller = _Bar(title, total, unit, console) if console.is_terminal else _Lines(title, total, unit)
+    teller = _Bar(title, total, unit) if interactive() else _Lines(title, total, unit)
     try:
         yield teller.tell
     finally:
@@ -64,7 +63,7 @@ class _Lines:
 class _Bar:
     """A bar, from the third second on."""
 
-    def __init__(self, title: str, total: int, unit: str, console: Console) -> None:
+    def __init__(self, title: str, total: int, unit: str) -> None:
         self.begun = time.monotonic()
         self.bar = Progress(
             TextColumn("{task.description}"),
@@ -73,7 +72,8 @@ class _Bar:
             TextColumn(unit),
             TextColumn("{task.fields[rate]}"),
             TimeRemainingColumn(elapsed_when_finished=True),
-            console=console,
+            console=console(),
+            refresh_per_second=4,
             transient=True,
         )
         self.task = self.bar.add_task(title, total=total, rate="")

@@ -42,11 +42,16 @@ class Recorder:
     every: int
     exploiting: Exploiting
 
-    def epoch(self, run: Run, report: Report) -> dict[str, float]:
-        """Records an epoch, and after every ``every``-th one the state it led to, whose figures are returned."""
+    def epoch(self, run: Run, report: Report) -> tuple[dict[str, float], TeamDistribution | None]:
+        """Records an epoch, and after every ``every``-th one the state it led to.
+
+        Returns:
+            The figures of that state, NaN where it was not recorded, and its distribution over teams.
+        """
         clock = Clock()
         selecting = report.selecting
         entropy = effective = exploited = math.nan
+        distribution = None
         if run.epoch % self.every == 0:
             distribution = self.state(run)
             entropy = distribution.entropy
@@ -62,7 +67,7 @@ class Recorder:
         clock.lap("record_s")
         seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
         self.tables.add("timing", [tuple(seconds[column] for column in COLUMNS["timing"])])
-        return {"effective_teams": effective, "entropy": entropy, "exploitability": exploited}
+        return {"effective_teams": effective, "entropy": entropy, "exploitability": exploited}, distribution
 
     def distribution(self, run: Run) -> TeamDistribution:
         """Returns the distribution over teams after ``run.epoch`` epochs."""

@@ -159,6 +159,11 @@ class Tables:
         csv.writer(self.files[name], lineterminator="\n").writerows([cell(v) for v in row] for row in rows)
         self.files[name].flush()
 
+    def rows(self, name: str) -> int:
+        """Returns how many rows table ``name`` has."""
+        with Path(self.files[name].name).open("rb") as file:
+            return sum(1 for _ in file) - 1
+
     def sizes(self) -> dict[str, int]:
         """Returns the bytes of each table, all of which are on the disk then."""
         for file in self.files.values():

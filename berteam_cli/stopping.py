@@ -29,7 +29,10 @@ class Stop:
 
 @contextmanager
 def stoppable() -> Iterator[Stop]:
-    """Lets Ctrl-C, SIGTERM and SIGHUP end the run after its epoch, at once between epochs, and at once if repeated."""
+    """Lets Ctrl-C, SIGTERM and SIGHUP end the run after its epoch, at once between epochs, and at once if repeated.
+
+    SIGHUP stays ignored where it is, as nohup has it: such a run outlives its terminal.
+    """
     stop = Stop()
 
     def ask(number: int, frame: FrameType | None) -> None:
@@ -39,7 +42,8 @@ def stoppable() -> Iterator[Stop]:
         log.info("Stopping after this epoch; once more to stop at once.")
 
     try:
-        before = {number: signal.signal(number, ask) for number in SIGNALS}
+        heard = [n for n in SIGNALS if n == signal.SIGINT or signal.getsignal(n) is not signal.SIG_IGN]
+        before = {number: signal.signal(number, ask) for number in heard}
     except ValueError:  # not the main thread: whoever owns that handles signals
         yield stop
         return

@@ -50,7 +50,8 @@ def test_nothing_is_said_of_quick_work(clock, told):
 
 def test_a_terminal_has_a_bar_with_rate_and_time(clock, monkeypatch):
     screen = io.StringIO()
-    monkeypatch.setattr(module, "Console", lambda: Console(file=screen, force_terminal=True, width=100))
+    monkeypatch.setattr(module, "console", lambda: Console(file=screen, force_terminal=True, width=100))
+    monkeypatch.setattr(module, "interactive", lambda: True)
     with progress("Comparing", 500, "games") as tell:
         clock["s"] = 1.0
         tell(100)

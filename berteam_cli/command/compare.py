@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import logging
 import math
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from rich.console import Console
 
-from berteam_cli.command.inspect import narrow, plain, printed, read_table
+from berteam_cli.command.inspect import narrow, printed, read_table
 from berteam_cli.config_commands import CompareConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.comparison import Comparison, Figures, Played, compared, counted, planned
@@ -26,6 +26,7 @@ from berteam_cli.outcomes import Ints
 from berteam_cli.rating.bootstrap import superiority, with_interval
 from berteam_cli.records import COLUMNS, write_table
 from berteam_cli.stored import begun
+from berteam_cli.terminal import berteam, console, end
 from berteam_cli.training import key
 from berteam_cli.trust import trusted
 from berteam_cli.workers import Workers, available_cores
@@ -62,7 +63,6 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
         logging_to(folder),
         manifest.until_the_end(again=again),
     ):
-        log.info("%s", folder)
         for sentence in broken:
             log.info("%s.", sentence)
         games = Games(runs[0].parts.games.env, Workers(config.workers or available_cores()))
@@ -78,7 +78,7 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
         write_table(folder / "runs.csv", COLUMNS["runs"], run_rows(found.runs, names, of, runs, seconds))
         write_table(folder / "versus.csv", COLUMNS["versus"], versus_rows(found, played, names, of))
         forget(sheet)
-    show(folder)
+    show(folder, runs)
     return math.nan
 
 
@@ -132,10 +132,10 @@ def versus_rows(found: Comparison, played: Played, names: list[str], of: Ints) -
             yield names[a], names[b], counts[a, b].sum(), *counts[a, b], *score, above[a, b], *better
 
 
-def show(folder: Path) -> None:
-    """Prints the tables of a comparison."""
-    console = Console(width=None if Console().is_terminal else 140)
+def show(folder: Path, runs: list[Contender]) -> None:
+    """Prints the tables of a comparison of ``runs``."""
     titles = ("Algorithms: Elo with 95 % intervals, seconds", "Runs", "Algorithm against algorithm")
     for name, title in zip(TABLES, titles, strict=True):
-        console.print(printed(title, narrow(pd.read_csv(folder / f"{name}.csv"))))
-        console.print(plain(folder / f"{name}.csv"), highlight=False, soft_wrap=True)
+        console().print(printed(title, narrow(pd.read_csv(folder / f"{name}.csv"))))
+    then = berteam("report", [run.folder for run in runs], shlex.quote(f"compare={folder}"))
+    end(folder, [f"{name}.csv" for name in TABLES], then)

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.random import Generator
-from rich.console import Console
 
-from berteam_cli.command.inspect import plain, printed
+from berteam_cli.command.inspect import printed
 from berteam_cli.config_commands import EvaluateConfig
 from berteam_cli.evaluation.calibration import deciles
 from berteam_cli.evaluation.conditioning import conditioning_rows, encounters
@@ -36,6 +35,7 @@ from berteam_cli.selector.base import TeamDistribution, measured, team_count
 from berteam_cli.selector.embeddings import Embedding
 from berteam_cli.selector.independent import with_all_teams
 from berteam_cli.stored import write_config
+from berteam_cli.terminal import berteam, console, end, say
 from berteam_cli.training import EVALUATION as CHANCE
 from berteam_cli.training import Parts, Run, generator
 from berteam_cli.trust import trusted
@@ -69,10 +69,10 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
     parts, run = last_state(folder, config.workers, trusted(config.trust))
     far = how_far(folder, run.epoch)
     place = folder / EVALUATION
-    look = Look(config, parts, run, place, Console(width=None if Console().is_terminal else 120))
-    look.say(f"{folder} {far}")
+    look = Look(config, parts, run, place)
     with held(place), logging_to(place):
         write_config(place, text)
+        say(f"{folder} {far}")
         manifest = Manifest.begun(place, run=str(folder), epoch=run.epoch, evaluated=far, seed=config.seed)
         with manifest.until_the_end(again="The same command goes on from there."):
             tables, facts = look.all()
@@ -81,11 +81,12 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
                 path = place / f"{name}.csv"
                 if name in tables:
                     write_table(path, COLUMNS[name], tables[name])
-                    look.say(str(path))
                 else:  # of an evaluation that had more to say
                     path.unlink(missing_ok=True)
             for sheet in SHEETS:
                 forget(place / sheet)
+    files = [f"{name}.csv" for name in TABLES if name in tables]
+    end(place, files, berteam("report", [folder]))
     return next(row[2] for row in tables["figures"] if row[1] == "expected_elo")
 
 
@@ -97,14 +98,12 @@ class Look:
         config: of the command.
         parts, run: what is looked at.
         place: where the tables go.
-        console: where they are shown.
     """
 
     config: EvaluateConfig
     parts: Parts
     run: Run
     place: Path
-    console: Console
 
     def all(self) -> tuple[Tables, dict[str, Any]]:
         """Returns the rows of all tables, and what the manifest should say."""
@@ -123,13 +122,13 @@ class Look:
             behaviour = behaved.aggression
             tables |= self.manners(behaved, found, learned, behaving)
         else:
-            self.say(f"Games of {parts.games.env.name} count no events, so nobody is aggressive or defensive.")
+            say(f"Games of {parts.games.env.name} count no events, so nobody is aggressive or defensive.")
         tables |= self.points(learned, playing)
         if isinstance(parts.selector, Embedding):
             tables |= likeness(run, parts, behaviour)
             self.show("Cosine between members' embeddings, mean over the pairs of a group", tables, "embeddings")
         else:
-            self.say("The selector has no embeddings of members to compare.")
+            say("The selector has no embeddings of members to compare.")
         if parts.selector.answers and parts.selector.field.sides == 2:
             tables |= conditioning_rows(run.epoch, encounters(run, parts, known, ENCOUNTERS, meeting, self.place / MET))
             title = f"Elo of the choice before and after a first game, {ENCOUNTERS} encounters with each fixed team"
@@ -141,7 +140,7 @@ class Look:
         field = self.parts.selector.field
         found = measured(self.parts.selector, self.run.selection, rng)
         if found.samples:
-            self.say(
+            say(
                 f"The chances of teams are estimated from {found.samples:,} drawn ones (selector.exact_limit), "
                 f"so there is no regression and no calibration."
             )
@@ -156,7 +155,7 @@ class Look:
         chosen = choose_teams(learned, lambda count: selector.sample(self.run.selection, count, choosing), 1, most)
         teams = team_count(selector.field.members, selector.field.team_size)
         if len(chosen) < teams:
-            self.say(f"{len(chosen):,} of {teams:,} possible teams are rated (teams_at_most={most:,}).")
+            say(f"{len(chosen):,} of {teams:,} possible teams are rated (teams_at_most={most:,}).")
         title = f"Rating {len(chosen):,} teams"
         found = match.strength(chosen, self.config.games_per_pair, playing, title, self.place / PLAYED)
         return found, {"teams": teams, "rated": len(chosen), "reference": match.reference.source}
@@ -192,31 +191,27 @@ class Look:
         """Returns and shows the rows of reference_points.csv, or says why there are none."""
         reason = why_not(self.parts, learned, self.config.most)
         if reason:
-            self.say(f"{reason}, so there are no reference points.")
+            say(f"{reason}, so there are no reference points.")
             return {}
         points = reference_points(self.run, self.parts, learned, self.config.payoff_games, rng, self.place / PAYOFFS)
         tables: Tables = {"reference_points": point_rows(self.run, self.parts, points)}
         self.show("Teams, the most probable first", tables, "reference_points")
-        self.console.print(printed("Mixes: exploitability, total variation from what was learnt", mixes(points)))
-        self.say(f"Of all Nash equilibria of wins less losses this is {points.equilibrium.which}.")
+        console().print(printed("Mixes: exploitability, total variation from what was learnt", mixes(points)))
+        say(f"Of all Nash equilibria of wins less losses this is {points.equilibrium.which}.")
         unbeaten = team_names(points.learned.teams[~points.played.wins.any(axis=0)])
         top = self.config.top
         listed = ", ".join(unbeaten[:top]) + (f" and {len(unbeaten) - top} more" if len(unbeaten) > top else "")
-        self.say(f"Teams that never lost: {listed or 'none'}.")
+        say(f"Teams that never lost: {listed or 'none'}.")
         return tables
 
     def dated(self, rows: Iterable[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
         """Returns ``rows`` with the epoch in front."""
         return [(self.run.epoch, *row) for row in rows]
 
-    def say(self, sentence: str) -> None:
-        """Prints a sentence."""
-        self.console.print(plain(sentence), highlight=False, soft_wrap=True)
-
     def show(self, title: str, tables: Tables, name: str, leave: Sequence[str] = (), *, whole: bool = False) -> None:
         """Prints the first rows of a table, as many as the config says, or the ``whole`` of it."""
         table = pd.DataFrame(tables[name], columns=COLUMNS[name]).drop(columns=[*leave, "epoch"], errors="ignore")
-        self.console.print(printed(title, table if whole else table.head(self.config.top)))
+        console().print(printed(title, table if whole else table.head(self.config.top)))
 
 
 def mixes(points: Points) -> pd.DataFrame:

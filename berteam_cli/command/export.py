@@ -9,11 +9,13 @@ from gymnasium.spaces import Box
 
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
-from berteam_cli.errors import InputError, did_you_mean, shown
+from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.folder import write_whole
 from berteam_cli.learner.exporting import exported
 from berteam_cli.population import island_of, names
+from berteam_cli.quiet import written
 from berteam_cli.reading import last_state
+from berteam_cli.terminal import end, say
 from berteam_cli.trust import told
 
 KEYS = ("agent", "out", "on_exists")
@@ -44,9 +46,9 @@ def export(folder: Path, overrides: list[str]) -> Path:
     except ValueError as error:
         raise InputError(f"agent={agent} ({called}) cannot be exported: {error}.") from error
     write_whole(path, model.save)
-    print(
-        shown(f"{called} of {folder} after epoch {run.epoch}."), loading(type(model), path), shown(str(path)), sep="\n"
-    )
+    say(f"{called} of {folder} after epoch {run.epoch}.")
+    written(path)
+    end(path.parent, [path.name], f"in Python: {loading(type(model), path)}")
     return path
 
 

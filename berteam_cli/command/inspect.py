@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from berteam_cli.errors import InputError, shown
 from berteam_cli.folder import read_manifest
-from berteam_cli.records import COLUMNS
+from berteam_cli.records import COLUMNS, EVALUATION
+from berteam_cli.terminal import berteam, console, end, say
 from berteam_cli.trust import told
 
 WHOLE = {"team": str, "blue": str, "red": str, "best_team": str, "opponent": str}  # 3 is a team, not a number
@@ -91,7 +91,7 @@ def inspect(folder: Path, top: int, overrides: Sequence[str] = ()) -> None:
     show(folder, top)
     teams = read_table(folder, "team_distribution")
     if teams is not None and (teams.team == "other").any() and (folder / "checkpoint").exists():
-        Console(width=None if Console().is_terminal else 120).print(searched(folder, top, trust))
+        console().print(searched(folder, top, trust))
 
 
 def searched(folder: Path, top: int, trust: Sequence[str]) -> Table:
@@ -126,34 +126,44 @@ def show(folder: Path, top: int) -> None:
     Raises:
         InputError: there is no run, or a table cannot be read.
     """
-    console = Console(width=None if Console().is_terminal else 120)
+    out = console()
     if (folder / "sweep.csv").exists():
         shown = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
+        columns = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
         try:
-            table = pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[shown]
+            table = pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[columns]
         except (OSError, ValueError, KeyError) as error:
             raise InputError(f"{folder / 'sweep.csv'} cannot be read as the table of a sweep: {error}.") from error
-        console.print(printed(f"Sweep {folder}", table))
+        out.print(printed(f"Sweep {folder}", table))
+        end(folder, ["sweep.csv"], f"{berteam('compare', [folder])}/*/")
         return
     manifest = read_manifest(folder)
-    console.print(plain(f"{folder}: {manifest['status']}, started {manifest['started']}"), highlight=False)
+    say(f"{folder}: {manifest['status']}, started {manifest['started']}")
     shown = ("summary", "elo", "team_distribution", "agents", "pairs")
     tables = {name: read_table(folder, name, whole=manifest["status"] == "done") for name in shown}
     summary, elo, teams, agents = (tables[x] for x in ("summary", "elo", "team_distribution", "agents"))
     if summary is not None and len(summary):
-        console.print(printed("Figures", summary.T.reset_index().set_axis(["figure", "value"], axis=1)))
+        out.print(printed("Figures", summary.T.reset_index().set_axis(["figure", "value"], axis=1)))
     if elo is not None and len(elo):
         ranked = ["rank", "team", "members", "elo", "elo_low", "elo_high", "wins", "draws", "losses", "probability"]
-        console.print(printed(f"Strongest of {len(elo)} rated teams", elo[ranked].head(top)))
+        out.print(printed(f"Strongest of {len(elo)} rated teams", elo[ranked].head(top)))
     if teams is not None and len(teams):
         last = teams[teams.epoch == teams.epoch.max()].sort_values("probability", ascending=False, kind="stable")
-        console.print(printed(f"Most probable teams after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))
+        out.print(printed(f"Most probable teams after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))
     if agents is not None and len(agents):
         last = agents[agents.epoch == agents.epoch.max()].sort_values("fitness", ascending=False, kind="stable")
-        console.print(printed(f"Fittest members after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))
+        out.print(printed(f"Fittest members after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))
     files = sorted(path.name for path in folder.iterdir() if path.suffix in {".csv", ".json", ".yaml", ".txt"})
-    console.print(plain(f"Files in {folder}: {', '.join(files)}"), highlight=False)
-    console.print(plain(f"See them again with: berteam inspect {folder}"), highlight=False)
+    end(folder, files, *next_commands(folder, manifest["status"]))
+
+
+def next_commands(folder: Path, status: str) -> list[str]:
+    """Returns what to do next with a folder of that ``status``."""
+    trained = any((folder / "checkpoint").glob("epoch_*"))
+    if status == "done":
+        then = "evaluate" if trained and not (folder / EVALUATION).exists() else "report"
+        return [berteam(then, [folder])]
+    return [berteam("resume", [folder])] if trained and status != "running" else [berteam("inspect", [folder])]
 
 
 def printed(title: str, frame: pd.DataFrame) -> Table:

@@ -16,12 +16,14 @@ from berteam_cli.config import checked
 from berteam_cli.config_commands import ReplayConfig
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
-from berteam_cli.errors import InputError, RunError, shown
+from berteam_cli.errors import InputError, RunError
 from berteam_cli.folder import new_folder, read_manifest, write_whole
 from berteam_cli.games import Games, pairings
 from berteam_cli.outcomes import Experience, Ints, Outcomes
 from berteam_cli.population import names, policies
+from berteam_cli.quiet import written
 from berteam_cli.stored import stored_config
+from berteam_cli.terminal import end, say
 from berteam_cli.trust import trusted
 from berteam_cli.workers import Workers
 from mctf.film import Film, filmed
@@ -76,7 +78,11 @@ def replay(config: ReplayConfig, text: str, out: Path | None) -> float:
             write_whole(path, lambda part: write_page(film, part, steering, match.title))
         else:
             write_whole(path, lambda part: write_gif(film, part))
-    print(shown(f"{match.title}."), ending(film), *(shown(str(path)) for path in files.values()), sep="\n")
+    say(f"{match.title}.")
+    say(ending(film))
+    first = next(iter(files.values()))
+    written(first)
+    end(first.parent, [path.name for path in files.values()], f"open {first} in a browser")
     return math.nan
 
 

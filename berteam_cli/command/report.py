@@ -7,13 +7,15 @@ from functools import partial
 from pathlib import Path
 
 from berteam_cli.config_commands import ReportConfig
-from berteam_cli.errors import InputError, shown
+from berteam_cli.errors import InputError
 from berteam_cli.folder import new_folder, write_whole
+from berteam_cli.quiet import written
 from berteam_cli.report import chosen, course, members, overview, page, strength
 from berteam_cli.report.drawing import Plot, check_matplotlib, styled
 from berteam_cli.report.film import best_game
 from berteam_cli.report.page import Report, Section
 from berteam_cli.report.source import Source
+from berteam_cli.terminal import end
 from berteam_cli.trust import trusted
 
 PAGE = "report.html"
@@ -52,7 +54,8 @@ def report(config: ReportConfig, _: str, out: Path | None) -> float:
             else:
                 picture.unlink(missing_ok=True)  # of an earlier report
     write_whole(folder / PAGE, lambda part: part.write_text(text, encoding="utf-8"))
-    print(shown(str(folder / PAGE)))
+    written(folder)
+    end(folder, sorted([PAGE, *(path.name for path in folder.glob("*.png"))]), f"open {folder / PAGE} in a browser")
     return math.nan
 
 

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
-from rich.console import Console
 
 from berteam_cli.command.compare import compare
 from berteam_cli.command.evaluate import evaluate
-from berteam_cli.command.inspect import narrow, plain, printed
+from berteam_cli.command.inspect import narrow, printed
 from berteam_cli.command.report import report
 from berteam_cli.command.tournament import tournament
 from berteam_cli.command.train import train
@@ -21,9 +20,11 @@ from berteam_cli.config_commands import ReproduceConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.paper import Reproduced, rows
 from berteam_cli.folder import CONFIG, MANIFEST, read_manifest
+from berteam_cli.quiet import written
 from berteam_cli.records import COLUMNS, EVALUATION, write_table
 from berteam_cli.report.drawing import check_matplotlib
 from berteam_cli.stored import plain_config, write_config
+from berteam_cli.terminal import console, end, say
 
 GAMES_PER_PAIR, BETWEEN, AGAINST = 10, 10_000, 1_000  # of an evaluation and of a comparison, at scale 1
 
@@ -71,6 +72,8 @@ def reproduce(config: ReproduceConfig, text: str, folder: Path | None = None) ->
         raise InputError(f"seeds must be different whole numbers >= 0 and < 2**63, one at least, but is {seeds}.")
     check_matplotlib()  # which the report needs at the very end
     begin(folder, config, text)
+    written(folder)
+    say(str(folder))
     work = Work(config, folder)
     runs = {
         algorithm: [work.trained(algorithm, seed) for seed in config.seeds] for algorithm in work.experiment.algorithms
@@ -204,11 +207,10 @@ def quoted(folder: Path) -> str:
 
 def show(folder: Path, config: ReproduceConfig) -> None:
     """Prints the paper's numbers beside ours, and what lies where."""
-    console = Console(width=None if Console().is_terminal else 140)
     table = pd.read_csv(folder / "paper.csv").rename(columns={"low": "here_low", "high": "here_high"})
     title = f"{config.what}, scale {config.scale:g}, seeds {json.dumps(list(config.seeds))}"
-    console.print(printed(title, narrow(table)))
+    console().print(printed(title, narrow(table)))
     if config.scale < 1:
-        console.print("A smaller scale than 1 trains for less than the paper; its numbers are not the paper's.")
-    for path in (folder / "paper.csv", folder / "report" / "report.html"):
-        console.print(plain(path), highlight=False, soft_wrap=True)
+        say("A smaller scale than 1 trains for less than the paper; its numbers are not the paper's.")
+    page = Path("report", "report.html")
+    end(folder, ["paper.csv", str(page)], f"open {folder / page} in a browser")

@@ -60,7 +60,6 @@ def tournament(config: TournamentConfig, text: str, folder: Path | None = None) 
     folder = folder or new_folder("tournament")
     facts = {"seed": config.seed, "teams": len(entry.teams), "pairs": len(entry.teams) * (len(entry.teams) - 1) // 2}
     with begun(folder, config.on_exists, text, "tournament", facts | entry.facts) as manifest, logging_to(folder):
-        log.info("%s", folder)
         log.info("%d teams, %d pairs, %d games each.", facts["teams"], facts["pairs"], config.games_per_pair)
         with manifest.until_the_end(again=f"Go on with the same command and out={folder} on_exists=resume."):
             rng = np.random.default_rng(config.seed)

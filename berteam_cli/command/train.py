@@ -18,6 +18,7 @@ from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder
 from berteam_cli.holding import held
+from berteam_cli.live import View, shown
 from berteam_cli.logger.base import Once
 from berteam_cli.logger.opening import check_logger, figures_of, logger
 from berteam_cli.memory import spoken, state_bytes
@@ -61,7 +62,6 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         claim(folder, "overwrite" if goes_on(config, folder) else config.on_exists)
     write_config(folder, text)
     with logging_to(folder):
-        log.info("%s", folder)
         state = sum(state_bytes(island) for island in parts.optimizer.islands)
         played = sum(column.nbytes for column in parts.room or ())
         for remark in parts.selector.remarks():
@@ -115,23 +115,28 @@ def trained(
 
     for name in END_TABLES:
         (folder / f"{name}.csv").unlink(missing_ok=True)  # of an earlier end of this run
+    distribution = None
     if saved is None:
-        recorder.state(run)
+        distribution = recorder.state(run)
         keep()
     pace = Pace(run.epoch, config.epochs)
-    while run.epoch < config.epochs:
-        stop.in_epoch = True
-        run, report = epoch(run, parts)
-        state = recorder.epoch(run, report)
-        also(run.epoch, figures_of(run, report, parts, state))
-        pace.tell(run.epoch, config.games_per_epoch)
-        asked = stop.asked  # later than this it ends after the next epoch
-        if asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
-            keep()
-        stop.in_epoch = False
-        if asked:
-            tables.close()
-            raise KeyboardInterrupt
+    view = View(parts, config.epochs, pace, run)
+    view.tell(run, tables.rows("generations"), distribution)
+    with shown(view):
+        while run.epoch < config.epochs:
+            stop.in_epoch = True
+            run, report = epoch(run, parts)
+            state, distribution = recorder.epoch(run, report)
+            also(run.epoch, figures_of(run, report, parts, state))
+            pace.tell(run.epoch, config.games_per_epoch)
+            view.tell(run, len(report.replaced), distribution)
+            asked = stop.asked  # later than this it ends after the next epoch
+            if asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
+                keep()
+            stop.in_epoch = False
+            if asked:
+                tables.close()
+                raise KeyboardInterrupt
     recorder.last(run)
     tables.close()
     return run, recorder

@@ -163,7 +163,7 @@ def test_exploitability_is_measured_where_the_steps_suffice(people, needed, bert
 def test_figures_are_those_of_the_tables(berteam, tmp_path):
     berteam("train", *LEARNERS, *SMALL_BERTEAM, "epochs=6", "out=run")
     said = berteam("evaluate", "run").stdout
-    assert said.startswith("run after epoch 6\n")
+    assert said.startswith("run/evaluation\nrun after epoch 6\n")
     elo, regressed, deciles = (read(tmp_path / "run", name) for name in ("elo", "regression", "calibration"))
     figures = read(tmp_path / "run", "figures").set_index("quantity")
     last = pd.read_csv(tmp_path / "run" / "team_distribution.csv", dtype={"team": str}).query("epoch == 6")
@@ -274,7 +274,7 @@ def test_a_run_that_was_broken_off_is_looked_at_as_far_as_it_got(berteam, tmp_pa
     for status, word in (("interrupted", "interrupted"), ("running", "broken off")):
         manifest.write_text(json.dumps(about | {"status": status}))
         said = berteam("evaluate", "run").stdout
-        assert said.startswith(f"run after epoch 4 of 200, {word}\n")
+        assert said.startswith(f"run/evaluation\nrun after epoch 4 of 200, {word}\n")
         kept = json.loads((tmp_path / "run" / "evaluation" / "manifest.json").read_text())
         assert kept["evaluated"] == f"after epoch 4 of 200, {word}"
         assert (kept["epoch"], kept["status"], kept["rated"]) == (4, "done", 21)

@@ -52,9 +52,9 @@ def test_members_act_the_same_when_loaded(run, berteam, tmp_path):
     work, seen = np.zeros(2 * ours.sizes.max(), dtype=np.float32), np.array([1, 0, 0, 0], dtype=np.float32)
     for agent in (1, 4):
         said = berteam("export", "run", f"agent={agent}").stdout.splitlines()
-        assert said[-1] == f"run/agent_{agent}.zip"
+        assert said[1] == f"Files in run: agent_{agent}.zip"
         assert said[0] == f"ppo{(64, 96)[agent // 3]}.{agent % 3} of run after epoch 4."
-        model = PPO.load(said[-1])
+        model = PPO.load(tmp_path / "run" / f"agent_{agent}.zip")
         assert (model.observation_space.shape, model.action_space.n) == ((4,), 3)
         grid = (np.arange(4000) + 0.5) / 4000
         shares = np.bincount([act(ours, agent, seen, work, 0.0, x) for x in grid], minlength=3) / 4000
@@ -72,7 +72,7 @@ def test_members_act_the_same_when_loaded(run, berteam, tmp_path):
 
 def test_the_line_it_prints_loads_the_member(run, berteam, tmp_path):
     for agent in (0, 6):
-        line = berteam("export", "run", f"agent={agent}").stdout.splitlines()[1]
+        line = berteam("export", "run", f"agent={agent}").stdout.splitlines()[-1].removeprefix("Next: in Python: ")
         found = {"observation": np.ones(4, dtype=np.float32)}
         exec(line, found)
         assert type(found["model"]) is (PPO if agent == 0 else DQN)

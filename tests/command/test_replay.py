@@ -31,13 +31,13 @@ def run(berteam, tmp_path):
 
 def test_fixed_policies(berteam, tmp_path):
     said = berteam("replay", "blue=2-5", "red=attack_easy-3", "seed=4", "out=game", "format=both").stdout
-    first, ended, *paths = said.splitlines()
+    first, ended, *last = said.splitlines()
     assert first == (
         "Fixed policies: blue 2-5 (attack_hard + defend_hard) against red 0-3 (attack_easy + defend_easy), seed 4."
     )
     assert re.fullmatch(r"Blue wins, 1 to 0, after \d:\d\d \(\d+ steps\)\.", ended)
-    assert paths == ["game.html", "game.gif"]
-    assert {path.name for path in tmp_path.iterdir()} == set(paths)
+    assert last == ["Files in .: game.html, game.gif", "Next: open game.html in a browser"]
+    assert {path.name for path in tmp_path.iterdir()} == {"game.html", "game.gif"}
     film = film_in(tmp_path / "game.html")
     assert film["names"] == ["2 attack_hard", "5 defend_hard", "0 attack_easy", "3 defend_easy"]
     assert film["frames"] == int(re.search(r"\((\d+) steps", ended)[1]) + 1
@@ -61,13 +61,13 @@ def test_a_run(berteam, run, tmp_path):
     assert said[0].startswith(
         f"run after epoch 4: blue {best} (main.{best[0]} + main.{best[2]}) against red {second} ("
     )
-    assert said[2] == f"run/replay/{best}_{second}.html"
-    assert film_in(tmp_path / said[2])["limit"] == 30.0
+    assert said[3] == f"Next: open run/replay/{best}_{second}.html in a browser"
+    assert film_in(run / "replay" / f"{best}_{second}.html")["limit"] == 30.0
 
     # Which of the strongest is not the other; the order of the members is kept
     assert f"blue {second} (" in berteam("replay", "run", f"red={best}").stdout
     said = berteam("replay", "run", "blue=5-1", "red=3-3", "seed=2").stdout.splitlines()
-    assert said[2] == "run/replay/5-1_3-3.html"
+    assert said[2] == "Files in run/replay: 5-1_3-3.html"
     film = film_in(run / "replay" / "5-1_3-3.html")
     assert film["names"] == ["5 main.5", "1 main.1", "3 main.3", "3 main.3"]
 
