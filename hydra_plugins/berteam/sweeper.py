@@ -1,0 +1,35 @@
+"""Hydra's door to berteam's sweeps. Hydra imports this at every start, so it imports nothing itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hydra.core.plugins import Plugins
+from hydra.plugins.launcher import Launcher
+from hydra.plugins.sweeper import Sweeper
+from hydra.types import HydraContext, TaskFunction
+from omegaconf import DictConfig
+
+
+class BerteamSweeper(Sweeper):
+    """Runs the jobs in the sweep's folder that are not done, by whatever launcher was chosen."""
+
+    launcher: Launcher
+    folder: Path
+
+    def __init__(self, max_batch_size: int | None = None) -> None:
+        """Takes how many jobs the launcher gets at once; None: all."""
+        self.max_batch_size = max_batch_size
+
+    def setup(self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig) -> None:
+        """Makes the launcher."""
+        self.folder = Path(config.hydra.sweep.dir)
+        self.launcher = Plugins.instance().instantiate_launcher(
+            hydra_context=hydra_context, task_function=task_function, config=config
+        )
+
+    def sweep(self, arguments: list[str]) -> None:
+        """Runs what is not done; the jobs have their ``arguments`` in sweep.json already."""
+        from berteam_cli.sweep.launching import run  # noqa: PLC0415
+
+        run(self.folder, self.launcher, self.max_batch_size)
