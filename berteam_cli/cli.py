@@ -173,43 +173,19 @@ def perform(word: str, cfg: DictConfig) -> float:
     from hydra.types import RunMode  # noqa: PLC0415
 
     if HydraConfig.get().mode == RunMode.MULTIRUN:
-        return job(word, cfg, HydraConfig.get())
-    try:
-        config, text = of_schemas(cfg)
-        return command_of(word)(config, text, Path(config.out) if getattr(config, "out", None) else None)
-    except (InputError, RunError) as error:  # past Hydra, which would print a traceback
-        refuse(error)
+        from berteam_cli.sweep.process import perform_job  # noqa: PLC0415
 
-
-def job(word: str, cfg: DictConfig, said: Any) -> float:
-    """Runs one job of a sweep, perhaps in a process of a launcher's; ``said`` is Hydra's own config."""
-    alone = not str(said.launcher._target_).endswith("BasicLauncher")
-    if alone:  # several share a machine; what is loaded from here on computes with one thread, beside our workers
-        for library in ("OMP", "OPENBLAS", "MKL", "NUMBA"):
-            os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    from berteam_cli.compose import prepare  # noqa: PLC0415
-    from berteam_cli.sweep.job import cores_each, in_sweep, swept  # noqa: PLC0415
-
-    prepare()
-    folder, overrides = Path(said.runtime.output_dir), list(said.overrides.task)
-    sys.argv = [f"berteam {word}", *overrides]  # what the run's manifest tells, wherever it runs
-
-    def task() -> float:
-        config, text = of_schemas(cfg)
-        config.workers = config.workers or cores_each(said.launcher, at_once)
-        return command_of(word)(config, text, folder)
-
-    at_once = in_sweep(folder, word, overrides, said.sweeper)
-    return swept(task, folder, overrides, alone=alone)
-
-
-def of_schemas(cfg: DictConfig) -> tuple[Any, str]:
-    """Returns the checked config, and the same as yaml."""
+        return perform_job(word, cfg, HydraConfig.get(), command_of)
     from omegaconf import OmegaConf  # noqa: PLC0415
 
     from berteam_cli.config import checked  # noqa: PLC0415
 
-    return checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
+    config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
+    out = getattr(config, "out", None)
+    try:
+        return command_of(word)(config, text, Path(out) if out else None)
+    except (InputError, RunError) as error:  # past Hydra, which would print a traceback
+        refuse(error)
 
 
 def refuse(error: InputError | RunError) -> NoReturn:

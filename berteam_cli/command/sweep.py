@@ -52,7 +52,7 @@ def from_file(path: Path, words: list[str], check: Check, launch: Launch) -> Non
     """
     held = plan.read_plan("sweep", path)
     shared, variants = plan.sweep_words(path, held)
-    command, shared = held["command"], ["-m", *shared, *words]
+    command, shared = held["command"], [*plan.flags(words), *shared, *arguments(words).overrides]
     for variant in variants:
         check(command, [*shared, *variant])
     shared, folder, _ = plan.planned(command, shared)
@@ -75,7 +75,7 @@ def searched(path: Path, words: list[str], check: Check, launch: Launch) -> None
     """
     held = plan.read_plan("optuna", path)
     asked = check_search(path, held)
-    shared = ["-m", *held["overrides"], *words]
+    shared = [*plan.flags(words), *held["overrides"], *arguments(words).overrides]
     check("train", [*shared, *ends(asked["ranges"])])
     shared, folder, _ = plan.planned("train", shared)
     jobs = plan.jobs_of("train", shared, [[]])
@@ -114,9 +114,9 @@ def resumed(folder: Path, words: list[str], check: Check, launch: Launch) -> Non
                 f"A job of {folder} says {word}, which may run code, and what only lies in a folder never does; "
                 f"if it is yours, say it too: berteam sweep --resume {folder} {shlex.quote(word)}"
             )
-    words = [word for word in words if word not in stored]
+    words = [*plan.flags(words), *(word for word in given if word not in stored)]
     check(sweep.command, words)
-    carry_out(folder, ["-m", *words, f"hydra.sweep.dir={plan.spelt(str(folder))}"], launch)
+    carry_out(folder, [*words, f"hydra.sweep.dir={plan.spelt(str(folder))}"], launch)
 
 
 def carry_out(folder: Path, words: list[str], launch: Launch, *, ours: bool = True) -> None:
@@ -133,14 +133,15 @@ def carry_out(folder: Path, words: list[str], launch: Launch, *, ours: bool = Tr
         RunError: some jobs are not done.
         KeyboardInterrupt: it was interrupted.
     """
-    command, said = Sweep.read(folder).command, plan.of_hydra_in(words)
-    how = [word for word in said if not word.startswith("hydra.sweep.dir=")]
-    again = shlex.join(["berteam", "sweep", "--resume", str(folder), *how])
+    command, flags = Sweep.read(folder).command, plan.flags(words)
+    settings = [word for word in arguments(words).overrides if plan.of_hydra(word)]
+    how = [word for word in settings if not word.startswith("hydra.sweep.dir=")]
+    again = shlex.join(["berteam", "sweep", "--resume", str(folder), *flags[1:], *how])
     print(f"{folder}: see {folder / TABLE}", flush=True)
     with working(folder / "sweep"):
         (folder / LOCKS / STOP).unlink(missing_ok=True)
         try:
-            launch(command, ["-m", *said] if ours else words)
+            launch(command, [*flags, *settings] if ours else words)
         except KeyboardInterrupt:
             print(f"Interrupted. Go on with: {again}", flush=True)
             raise

@@ -15,7 +15,6 @@ from berteam_cli.sweep.folder import LOCKS, Sweep, with_job, working, write_tabl
 from berteam_cli.workers import available_cores
 
 STOP = "stop"  # in LOCKS: no further job begins
-HERE = "BasicLauncher"  # runs jobs in the process of the command, one after the other
 
 
 def swept(task: Callable[[], float], folder: Path, overrides: list[str], *, alone: bool) -> float:

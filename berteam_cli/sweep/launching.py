@@ -13,7 +13,8 @@ from typing import Any
 
 from berteam_cli.folder import MANIFEST
 from berteam_cli.sweep.folder import LOCKS, Sweep, write_table
-from berteam_cli.sweep.job import HERE, STOP, told
+from berteam_cli.sweep.job import STOP, told
+from berteam_cli.sweep.process import HERE
 
 PRINTING = (HERE, "JoblibLauncher")  # their jobs' words reach the terminal
 LOOK_S = 0.5  # between two looks at jobs that run elsewhere

@@ -83,7 +83,7 @@ def planned(command: str, words: list[str]) -> tuple[list[str], Path, bool]:
         HydraConfig.instance().set_config(config)
         folder = Path(str(config.hydra.sweep.dir))
         ours = OmegaConf.select(config, "hydra.sweeper._target_") == OURS
-    return [*words, f"hydra.sweep.dir={spelt(str(folder))}"], folder, ours
+    return [*flags(words), *given.overrides, f"hydra.sweep.dir={spelt(str(folder))}"], folder, ours
 
 
 def of_hydra(word: str) -> bool:
@@ -91,12 +91,11 @@ def of_hydra(word: str) -> bool:
     return word.lstrip("+~").startswith(("hydra.", "hydra/"))
 
 
-def of_hydra_in(words: list[str]) -> list[str]:
-    """Returns what the words of a multirun say to Hydra: flags that name configs, and settings."""
+def flags(words: list[str]) -> list[str]:
+    """Returns the flags among the words of a multirun, which must stand before the overrides."""
     given = arguments(words)
-    flags = {"--config-dir": given.config_dir, "--config-name": given.config_name}
-    said = [text for flag, value in flags.items() if value for text in (flag, value)]
-    return said + [word for word in given.overrides if of_hydra(word)]
+    named = {"--config-dir": given.config_dir, "--config-name": given.config_name}
+    return ["-m", *(text for flag, value in named.items() if value for text in (flag, value))]
 
 
 def grid(overrides: list[Override]) -> list[list[str]]:

@@ -62,7 +62,7 @@ def test_joblib_goes_on_past_a_job_that_fails_and_resume_runs_it_again(berteam, 
 @pytest.mark.parametrize(
     ("launcher", "settings"),
     [
-        ("submitit_local", []),
+        ("submitit_local", ["hydra.launcher.cpus_per_task=1"]),
         ("ray", ["+hydra.launcher.ray.init.num_cpus=1", "+hydra.launcher.ray.init.include_dashboard=false"]),
     ],
 )
@@ -77,9 +77,9 @@ def test_a_job_that_fails_elsewhere_is_told_here(berteam, tmp_path, launcher, se
 
 
 def test_killed_in_the_middle_and_resumed(berteam, tmp_path):
-    words = ["train", *RPS, "epochs=20", "checkpoint_every=1", "evaluation.games=0"]
-    berteam(*words, "seed=1", "out=whole")
-    command = [BERTEAM, *words, "-m", "seed=0,1,2", "hydra.sweep.dir=sweep"]
+    words = [*RPS, "epochs=20", "checkpoint_every=1", "evaluation.games=0"]
+    berteam("train", *words, "seed=1", "out=whole")
+    command = [BERTEAM, "train", *words, "seed=0,1,2", "hydra.sweep.dir=sweep", "-m"]
     running = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL)
     sweep, checkpoints = tmp_path / "sweep", tmp_path / "sweep" / "1" / "checkpoint"
     while not list(checkpoints.glob("epoch_0000000[3-9]")):
