@@ -225,28 +225,10 @@ def resume(word: str, words: list[str]) -> None:
 
 
 def sweep(word: str, words: list[str]) -> None:
-    """Runs the sweep that a file describes, or what is missing of one.
+    """Runs the sweep that a file describes, or what is missing of one."""
+    from berteam_cli.command.sweep import asked  # noqa: PLC0415
 
-    Raises:
-        InputError: there is neither a file nor a folder.
-    """
-    what = "yaml file of the sweep, see docs/sweeps.md"
-    arguments: dict[str, dict[str, Any]] = {
-        "file": {"nargs": "?", "help": f"{what}; then hydra/launcher=NAME and other words for all jobs"}
-    }
-    if word == "sweep":
-        arguments["__resume"] = {"type": Path, "metavar": "DIR", "help": "runs what is not done of the sweep in DIR"}
-    given, rest = reader(word, words, known=True, **arguments)
-    from berteam_cli.command import sweep as sweeps  # noqa: PLC0415
-    from berteam_cli.compose import prepare  # noqa: PLC0415
-
-    prepare()
-    if resumes := getattr(given, "resume", None):
-        sweeps.resumed(resumes, [*([given.file] if given.file else []), *rest], checked_words, launch)
-    elif given.file is None or "=" in given.file:
-        raise InputError(f"berteam {word}: the file must be given first; see berteam {word} --help.")
-    else:
-        {"sweep": sweeps.from_file, "optuna": sweeps.searched}[word](Path(given.file), rest, checked_words, launch)
+    asked(word, functools.partial(reader, word, words, known=True), checked_words, launch)
 
 
 LEADING = {"replay": "run", "evaluate": "run", "compare": "runs", "report": "runs", "reproduce": "what"}

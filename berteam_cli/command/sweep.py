@@ -7,8 +7,9 @@ import shlex
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from berteam_cli.compose import arguments
+from berteam_cli.compose import arguments, prepare
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.sweep import plan
 from berteam_cli.sweep.folder import LOCKS, TABLE, Sweep, working
@@ -23,6 +24,35 @@ LAUNCHER = ("hydra/launcher=", "hydra.launcher.", "hydra.sweeper.max_batch_size=
 """What is said of how a sweep runs."""
 NAMES_CODE = re.compile(r"trust|(reward|target)\W.*:")
 """Words that may import code, or let a file run some."""
+
+
+def asked(word: str, read: Callable[..., Any], check: Check, launch: Launch) -> None:
+    """Runs what the words of `berteam sweep` or `berteam optuna` ask for.
+
+    Args:
+        word: which of the two.
+        read: reads the arguments it is given out of the words, and returns them and the other words.
+        check: of a command's words.
+        launch: runs a command.
+
+    Raises:
+        InputError: there is neither a file nor a folder, or it is wrong.
+        RunError: some jobs failed.
+    """
+    about = "yaml file, see docs/sweeps.md; after it hydra/launcher=NAME and other words for all jobs"
+    known: dict[str, dict[str, Any]] = {"file": {"nargs": "?", "help": about}}
+    if word == "sweep":
+        known["__resume"] = {"type": Path, "metavar": "DIR", "help": "runs what is not done of the sweep in DIR"}
+    given, rest = read(**known)
+    prepare()
+    if folder := getattr(given, "resume", None):
+        resumed(folder, [*([given.file] if given.file else []), *rest], check, launch)
+    elif given.file is None or "=" in given.file:
+        raise InputError(f"berteam {word}: the file must be given first; see berteam {word} --help.")
+    elif word == "sweep":
+        from_file(Path(given.file), rest, check, launch)
+    else:
+        searched(Path(given.file), rest, check, launch)
 
 
 def multirun(command: str, words: list[str], launch: Launch) -> None:
@@ -74,14 +104,14 @@ def searched(path: Path, words: list[str], check: Check, launch: Launch) -> None
         RunError: some jobs failed.
     """
     held = plan.read_plan("optuna", path)
-    asked = check_search(path, held)
+    goal = check_search(path, held)
     shared = [*plan.flags(words), *held["overrides"], *arguments(words).overrides]
-    check("train", [*shared, *ends(asked["ranges"])])
+    check("train", [*shared, *ends(goal["ranges"])])
     shared, folder, _ = plan.planned("train", shared)
     jobs = plan.jobs_of("train", shared, [[]])
     if len(jobs) > 1:
         raise InputError(f"{path}: overrides must give each key one value; what is searched through stands in search.")
-    plan.begin("train", folder, {}, asked | {"overrides": jobs[0]})
+    plan.begin("train", folder, {}, goal | {"overrides": jobs[0]})
     carry_out(folder, shared, launch)
 
 
@@ -164,9 +194,10 @@ def conclude(sweep: Sweep, again: str) -> None:
     if not (left := sum(states.values()) - states["done"]):
         print(f"All {states['done']} jobs are done: {table}")
         return
-    if states["interrupted"] and not states["failed"] + states["refused"]:
+    if (sweep.folder / LOCKS / STOP).exists():
         print(f"{left} of {len(sweep.jobs)} jobs are not done. Go on with: {again}", flush=True)
         raise KeyboardInterrupt
     failed = states["failed"] + states["refused"]
-    rest = f", {left - failed} others are not done" if left > failed else ""
-    raise RunError(f"{failed} runs of the sweep failed{rest}; {table} says which. Run them again with: {again}")
+    others = f", {left - failed} others are not done" if left > failed else ""
+    retry = "" if sweep.search and left == failed else f" Run them again with: {again}"  # a trial is told once
+    raise RunError(f"{failed} runs of the sweep failed{others}; {table} says which.{retry}")

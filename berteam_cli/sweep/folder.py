@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -65,7 +66,7 @@ class Sweep:
             (self.folder / LOCKS).mkdir(parents=True, exist_ok=True)
             said = {"schema": SCHEMA, "command": self.command, "search": self.search, "jobs": self.jobs}
             replace_with(self.folder / JOBS, json.dumps(said, indent=1) + "\n")
-            write_table(self.folder)
+            make_table(self.folder)
         except OSError as error:
             raise InputError(f"{self.folder} cannot be written: {error.strerror or error}.") from error
 
@@ -102,7 +103,15 @@ def with_job(folder: Path, command: str, job: int, overrides: Sequence[str]) -> 
 
 
 def write_table(folder: Path) -> None:
-    """Writes sweep.csv anew from what the jobs left; whoever writes later knows more."""
+    """Writes sweep.csv anew, or says that it cannot be: no job ends for that."""
+    try:
+        make_table(folder)
+    except OSError as error:
+        print(f"berteam: {folder / TABLE} cannot be written: {error.strerror or error}.", file=sys.stderr, flush=True)
+
+
+def make_table(folder: Path) -> None:
+    """Makes sweep.csv anew from what the jobs left; whoever writes later knows more."""
     with FileLock(folder / LOCKS / "table"):
         sweep = Sweep.read(folder)
         rows = []

@@ -7,11 +7,17 @@ import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from berteam_cli.folder import MANIFEST
+from hydra.core.utils import JobStatus
+from hydra.errors import HydraException
+from omegaconf.errors import OmegaConfBaseException
+
+from berteam_cli.compose import said
+from berteam_cli.folder import MANIFEST, Manifest
 from berteam_cli.sweep.folder import LOCKS, Sweep, write_table
 from berteam_cli.sweep.job import STOP, told
 from berteam_cli.sweep.process import HERE
@@ -20,47 +26,79 @@ PRINTING = (HERE, "JoblibLauncher")  # their jobs' words reach the terminal
 LOOK_S = 0.5  # between two looks at jobs that run elsewhere
 
 
-def run(folder: Path, launcher: Any, at_once: int | None) -> None:
+def run(folder: Path, launcher: Any, compose: Callable[[list[str]], object], at_once: int | None) -> None:
     """Runs what is not done of the sweep in ``folder``.
 
     Args:
         folder: of the sweep.
         launcher: Hydra's, set up.
+        compose: makes the config of a job from its words, as the launcher will.
         at_once: jobs that it gets at once; None: all.
     """
-    (folder / LOCKS / STOP).unlink(missing_ok=True)
     sweep = Sweep.read(folder)
-    launch = launched(sweep, launcher)
+    batch = Batch(sweep, launcher, compose)
     if sweep.search:
         from berteam_cli.sweep.search import search  # noqa: PLC0415 (an extra)
 
-        search(sweep, launch)
+        search(sweep, batch.launch)
         return
     jobs = sweep.unfinished()
     size = at_once or max(1, len(jobs))
     for start in range(0, len(jobs), size):
-        launch(jobs[start : start + size])
-
-
-def launched(sweep: Sweep, launcher: Any) -> Callable[[Sequence[int]], None]:
-    """Returns a function that runs jobs of ``sweep``, by their numbers, and comes back when they have ended."""
-    name = type(launcher).__name__
-
-    def launch(jobs: Sequence[int]) -> None:
-        if not jobs or (sweep.folder / LOCKS / STOP).exists():
+        if not batch.launch(jobs[start : start + size]):
             return
-        words = [[*sweep.jobs[job], *beginning(sweep, job), f"hydra.sweep.subdir={job}"] for job in jobs]
-        try:
-            with telling(sweep, jobs, quiet=name in PRINTING), stopping(sweep, here=name == HERE):
-                launcher.launch(words, initial_job_idx=jobs[0])
-        except Exception as error:  # a process that was killed takes joblib's others with it
-            said = (str(error).strip() or "no reason given").splitlines()[0]
-            print(f"berteam: The launcher gave up: {type(error).__name__}: {said}", file=sys.stderr, flush=True)
-            (sweep.folder / LOCKS / STOP).touch()
-        finally:
-            write_table(sweep.folder)
 
-    return launch
+
+@dataclass(frozen=True)
+class Batch:
+    """What runs some jobs of a sweep.
+
+    Attributes:
+        sweep: of the jobs.
+        launcher: Hydra's, set up.
+        compose: makes the config of a job from its words.
+    """
+
+    sweep: Sweep
+    launcher: Any
+    compose: Callable[[list[str]], object]
+
+    def launch(self, jobs: Sequence[int]) -> bool:
+        """Runs ``jobs`` and comes back when they have ended; returns whether others may follow."""
+        name, folder = type(self.launcher).__name__, self.sweep.folder
+        words = {job: [*self.sweep.jobs[job], *beginning(self.sweep, job)] for job in jobs}
+        words = {job: line for job, line in words.items() if self.fits(job, line)}
+        try:
+            if words:
+                with telling(self.sweep, list(words), quiet=name in PRINTING), stopping(folder, here=name == HERE):
+                    self.hand_over(words)
+        except Exception as error:  # a process that was killed takes joblib's others with it
+            why = (str(error).strip() or "no reason given").splitlines()[0]
+            print(f"berteam: The launcher gave up: {type(error).__name__}: {why}", file=sys.stderr, flush=True)
+            return False
+        finally:
+            write_table(folder)
+        return not (folder / LOCKS / STOP).exists()
+
+    def fits(self, job: int, words: list[str]) -> bool:
+        """Returns whether the words of a job go together for Hydra; a job whose do not is refused, and the rest run."""
+        try:
+            self.compose(words)
+        except (HydraException, OmegaConfBaseException) as error:
+            folder = self.sweep.folder / str(job)
+            folder.mkdir(exist_ok=True)
+            Manifest.begun(folder, status="refused").add(overrides=self.sweep.jobs[job], error=said(error))
+            print(told(job, self.sweep.jobs[job], said(error)), file=sys.stderr, flush=True)
+            return False
+        return True
+
+    def hand_over(self, jobs: dict[int, list[str]]) -> None:
+        """Gives jobs, their words by their number, to the launcher, and tells what befell it."""
+        words = [[*line, f"hydra.sweep.subdir={job}"] for job, line in jobs.items()]
+        for job, ended in zip(jobs, self.launcher.launch(words, initial_job_idx=min(jobs)), strict=True):
+            if ended.status == JobStatus.FAILED:  # outside of what swept() catches and writes down
+                error = ended._return_value
+                print(told(job, jobs[job], f"{type(error).__name__}: {error}"), file=sys.stderr, flush=True)
 
 
 def beginning(sweep: Sweep, job: int) -> list[str]:
@@ -109,17 +147,17 @@ def telling(sweep: Sweep, jobs: Sequence[int], *, quiet: bool) -> Iterator[None]
 
 
 @contextmanager
-def stopping(sweep: Sweep, *, here: bool) -> Iterator[None]:
+def stopping(folder: Path, *, here: bool) -> Iterator[None]:
     """Lets the first Ctrl-C end running jobs after their epoch and begin no other; the second ends all at once.
 
     Args:
-        sweep: of the jobs.
+        folder: of the sweep.
         here: whether they run in this process, and so hear of it themselves.
     """
     if here or threading.current_thread() is not threading.main_thread():
         yield
         return
-    stop = sweep.folder / LOCKS / STOP
+    stop = folder / LOCKS / STOP
 
     def ask(number: int, frame: FrameType | None) -> None:
         if number != signal.SIGINT or stop.exists():

@@ -13,8 +13,7 @@ from typing import Any
 import pandas as pd
 
 from berteam_cli.errors import InputError
-from berteam_cli.sweep.folder import LOCKS, TABLE, Sweep, with_job
-from berteam_cli.sweep.job import STOP
+from berteam_cli.sweep.folder import TABLE, Sweep, with_job
 from berteam_cli.sweep.plan import installed, spelt
 
 TRIALS = "optuna.log"
@@ -105,12 +104,12 @@ def ends(ranges: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def search(sweep: Sweep, launch: Callable[[Sequence[int]], None]) -> None:
+def search(sweep: Sweep, launch: Callable[[Sequence[int]], bool]) -> None:
     """Asks Optuna for values, runs their jobs and tells what came of them, until all trials are done.
 
     Args:
         sweep: with a search; its jobs are the trials so far.
-        launch: runs jobs by their numbers.
+        launch: runs jobs by their numbers; returns whether others may follow.
     """
     import optuna  # noqa: PLC0415 (an extra)
     from optuna.storages import JournalStorage  # noqa: PLC0415
@@ -142,8 +141,7 @@ def search(sweep: Sweep, launch: Callable[[Sequence[int]], None]) -> None:
             else:  # killed while it was asked
                 study.tell(trial.number, state=TrialState.FAIL)
         numbers = [trial.number for trial in under_way if trial.number in sweep.jobs]
-        launch([job for job in numbers if sweep.status(job)[0] != "done"])
-        if (folder / LOCKS / STOP).exists():
+        if not launch([job for job in numbers if sweep.status(job)[0] != "done"]):
             return
         elos = pd.read_csv(folder / TABLE, index_col="job").expected_elo
         for job in numbers:

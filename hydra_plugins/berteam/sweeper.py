@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hydra.core.config_loader import ConfigLoader
 from hydra.core.plugins import Plugins
 from hydra.plugins.launcher import Launcher
 from hydra.plugins.sweeper import Sweeper
@@ -15,6 +16,8 @@ class BerteamSweeper(Sweeper):
     """Runs the jobs in the sweep's folder that are not done, by whatever launcher was chosen."""
 
     launcher: Launcher
+    loader: ConfigLoader
+    config: DictConfig
     folder: Path
 
     def __init__(self, max_batch_size: int | None = None) -> None:
@@ -23,7 +26,7 @@ class BerteamSweeper(Sweeper):
 
     def setup(self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig) -> None:
         """Makes the launcher."""
-        self.folder = Path(config.hydra.sweep.dir)
+        self.folder, self.config, self.loader = Path(config.hydra.sweep.dir), config, hydra_context.config_loader
         self.launcher = Plugins.instance().instantiate_launcher(
             hydra_context=hydra_context, task_function=task_function, config=config
         )
@@ -32,4 +35,9 @@ class BerteamSweeper(Sweeper):
         """Runs what is not done; the jobs have their ``arguments`` in sweep.json already."""
         from berteam_cli.sweep.launching import run  # noqa: PLC0415
 
-        run(self.folder, self.launcher, self.max_batch_size)
+        run(
+            self.folder,
+            self.launcher,
+            lambda words: self.loader.load_sweep_config(self.config, words),
+            self.max_batch_size,
+        )

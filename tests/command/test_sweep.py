@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -168,6 +169,20 @@ def test_nothing_runs_that_only_lies_in_the_folder(berteam, tmp_path):
     assert "command must be one of" in berteam("sweep", "--resume", "sweep", code=2).stderr
 
 
+def test_what_does_not_go_together_is_refused_and_the_rest_runs(berteam, tmp_path):
+    Sweep(tmp_path / "sweep", "train", {0: [*RPS, "selector=nobody"], 1: [*RPS, "epochs=1"]}).keep()
+    refused = berteam("sweep", "--resume", "sweep", code=3).stderr
+    assert "berteam: job 0 (" in refused
+    assert list(table(tmp_path / "sweep").status) == ["refused", "done"]
+
+
+def test_a_sweeper_that_is_not_ours_has_a_table_too(berteam, tmp_path):
+    berteam("train", "-m", *RPS, "epochs=1", "seed=0,1", "hydra/sweeper=basic", "hydra.sweep.dir=sweep")
+    rows = table(tmp_path / "sweep")
+    assert list(rows.status) == ["done", "done"]
+    assert "seed=1" in rows.overrides[1]
+
+
 def test_two_processes_do_not_share_a_job(berteam, tmp_path):
     Sweep(tmp_path / "sweep", "train", {0: [*RPS, "epochs=1"]}).keep()
     with working(tmp_path / "sweep" / "0"):
@@ -208,6 +223,22 @@ def test_optuna_searches_and_goes_on(berteam, tmp_path):
     assert all(1e-3 <= float(x["selector.learning_rate"]) <= 1 for x in given)
     assert all(16 <= int(x["games_per_epoch"]) <= 24 and x["epochs"] in "12" for x in given)
     assert len({x["selector.learning_rate"] for x in given}) == 4
+
+    # As a kill leaves it while trials 2 and 3 run: they were asked for, and nothing came of them.
+    cut = tmp_path / "cut"
+    shutil.copytree(tmp_path / "whole", cut)
+    lines = (cut / "optuna.log").read_text().splitlines(keepends=True)
+    told = [k for k, line in enumerate(lines) if re.search(r'"state": ?1\b', line)]
+    (cut / "optuna.log").write_text("".join(lines[: told[2]]))
+    sweep = Sweep.read(cut)
+    for job in (2, 3):
+        shutil.rmtree(cut / str(job))
+        del sweep.jobs[job]
+    sweep.keep()
+    assert len(table(cut)) == 2
+    assert "Best of 4 trials" in berteam("sweep", "--resume", "cut").stdout
+    assert list(table(cut).overrides) == list(rows.overrides)
+    assert list(table(cut).expected_elo) == list(rows.expected_elo)
 
     break_job(tmp_path / "sweep", 3)
     failed = berteam("optuna", "search.yaml", "hydra.sweep.dir=sweep", code=3)
