@@ -1,4 +1,4 @@
-"""The command: a word, and what follows it. Besides config.py and compose.py only this module knows Hydra.
+"""The command: a word, and what follows it. Only this module, config.py, compose.py and sweep/plan.py know Hydra.
 
 Exit codes: 0 done, 2 the input is wrong, 3 the run failed, 130 interrupted.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import functools
 import importlib
 import io
 import itertools
@@ -29,6 +30,8 @@ INTERRUPTED = 130
 WORDS = {
     "train": "one run: selector x optimizer x env; -m sweeps",
     "resume": "goes on with a run from its last checkpoint",
+    "sweep": "runs that a file lists, or what is missing of a sweep",
+    "optuna": "runs whose values Optuna searches for",
     "tournament": "every team against every other",
     "replay": "one game as a page for the browser or as a GIF",
     "export": "a member as a file that Stable-Baselines3 loads",
@@ -97,7 +100,7 @@ def run(word: str, words: list[str]) -> None:
         raise InputError(f"{word!r} is no command; there are {', '.join(WORDS)}.{did_you_mean(word, WORDS)}")
     commands = {"train": training, "tournament": composed}
     commands |= {"resume": resume, "inspect": inspect, "export": export, "list": listing}
-    commands |= {"doctor": doctor, "completion": completion}
+    commands |= {"doctor": doctor, "completion": completion, "sweep": sweep, "optuna": sweep}
     commands.get(word, about)(word, words)
 
 
@@ -119,28 +122,46 @@ def training(word: str, words: list[str]) -> None:
 def composed(word: str, words: list[str]) -> None:
     """Runs a command whose config Hydra composes."""
     if {"-h", "--help"} & set(words):
-        from berteam_cli.catalogue import help_text  # noqa: PLC0415 (as below)
+        from berteam_cli.catalogue import help_text  # noqa: PLC0415 (start-up: each command imports what it needs)
 
         print(help_text(word))
         return
-    import hydra  # noqa: PLC0415 (start-up: each command imports what it needs)
-
-    from berteam_cli.compose import arguments, check, prepare, spelt_out  # noqa: PLC0415
+    from berteam_cli.compose import arguments, prepare, spelt_out  # noqa: PLC0415
 
     prepare()
     words = spelt_out(words)
-    Sweeps.failed, Sweeps.table = 0, None
     given = arguments(words)
     if not (given.hydra_help or given.shell_completion):
-        check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
+        checked_words(word, words)
+    if given.multirun and not (given.hydra_help or given.shell_completion or given.cfg or given.info):
+        from berteam_cli.command.sweep import multirun  # noqa: PLC0415
+
+        multirun(word, words, launch)
+    else:
+        launch(word, words)
+
+
+def checked_words(word: str, words: list[str]) -> None:
+    """Checks the words of a command that Hydra composes, and of each job where they are a sweep's.
+
+    Raises:
+        InputError: they are wrong.
+    """
+    from berteam_cli.compose import arguments, check  # noqa: PLC0415
+    from berteam_cli.sweep.plan import check_launcher  # noqa: PLC0415
+
+    given = arguments(words)
+    check_launcher(given.overrides)
+    check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
+
+
+def launch(word: str, words: list[str]) -> None:
+    """Lets Hydra run a command with words that are checked."""
+    import hydra  # noqa: PLC0415
+
     sys.argv = [f"berteam {word}", *words]
-
-    def task(cfg: DictConfig) -> float:
-        return perform(command_of(word), cfg)
-
+    task = functools.partial(perform, word)  # importable by name, as processes elsewhere must
     hydra.main(version_base="1.3", config_path="pkg://berteam_cli.conf", config_name=word)(task)()
-    if given.multirun and Sweeps.failed:
-        raise RunError(f"{Sweeps.failed} runs of the sweep failed; {Sweeps.table} says which.")
 
 
 def verify(word: str, config: Any, keys: list[str]) -> None:
@@ -180,38 +201,28 @@ def command_of(word: str) -> Callable[[Any, str, Path | None], float]:
     return getattr(module, word)
 
 
-class Sweeps:
-    """What became of the runs of a sweep in this process."""
-
-    failed = 0
-    table: Path | None = None
-
-
-def perform(command: Callable[[Any, str, Path | None], float], cfg: DictConfig) -> float:
-    """Runs ``command`` with the config, its yaml and its folder, as the job of a sweep if it is one.
+def perform(word: str, cfg: DictConfig) -> float:
+    """Runs a command with the config, its yaml and its folder, as the job of a sweep if it is one.
 
     Returns what the command returns; NaN for a job that failed.
     """
     from hydra.core.hydra_config import HydraConfig  # noqa: PLC0415
     from hydra.types import RunMode  # noqa: PLC0415
+
+    if HydraConfig.get().mode == RunMode.MULTIRUN:
+        from berteam_cli.sweep.process import perform_job  # noqa: PLC0415
+
+        return perform_job(word, cfg, HydraConfig.get(), command_of)
     from omegaconf import OmegaConf  # noqa: PLC0415
 
-    from berteam_cli.command.sweep import TABLE, swept  # noqa: PLC0415
     from berteam_cli.config import checked  # noqa: PLC0415
 
     config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
     out = getattr(config, "out", None)
-    if HydraConfig.get().mode != RunMode.MULTIRUN:
-        try:
-            return command(config, text, Path(out) if out else None)
-        except (InputError, RunError) as error:  # past Hydra, which would print a traceback
-            refuse(error)
-    folder = Path(HydraConfig.get().runtime.output_dir)
-    Sweeps.table = folder.parent / TABLE
-    quiet.written(folder.parent)
-    figure, ok = swept(lambda: command(config, text, folder), folder, list(HydraConfig.get().overrides.task))
-    Sweeps.failed += not ok
-    return figure
+    try:
+        return command_of(word)(config, text, Path(out) if out else None)
+    except (InputError, RunError) as error:  # past Hydra, which would print a traceback
+        refuse(error)
 
 
 def refuse(error: InputError | RunError) -> NoReturn:
@@ -220,8 +231,8 @@ def refuse(error: InputError | RunError) -> NoReturn:
     raise SystemExit(error.code) from None
 
 
-def reader(word: str, words: list[str], **arguments: dict[str, Any]) -> argparse.Namespace:
-    """Returns the arguments of a command that Hydra does not compose.
+def reader(word: str, words: list[str], *, known: bool = False, **arguments: dict[str, Any]) -> Any:
+    """Returns the arguments of a command that Hydra does not compose; of ``known`` ones only, and then also the rest.
 
     Raises:
         InputError: they are not of the command's form.
@@ -234,7 +245,7 @@ def reader(word: str, words: list[str], **arguments: dict[str, Any]) -> argparse
     parser.error = wrong  # type: ignore[assignment,method-assign]
     for name, settings in arguments.items():
         parser.add_argument(name.replace("__", "--"), **settings)
-    return parser.parse_args(words)
+    return parser.parse_known_args(words) if known else parser.parse_args(words)
 
 
 def resume(word: str, words: list[str]) -> None:
@@ -248,6 +259,13 @@ def resume(word: str, words: list[str]) -> None:
     from berteam_cli.command.resume import resume as go_on  # noqa: PLC0415
 
     go_on(given.run, given.overrides)
+
+
+def sweep(word: str, words: list[str]) -> None:
+    """Runs the sweep that a file describes, or what is missing of one."""
+    from berteam_cli.command.sweep import asked  # noqa: PLC0415
+
+    asked(word, functools.partial(reader, word, words, known=True), checked_words, launch)
 
 
 LEADING = {"replay": "run", "evaluate": "run", "compare": "runs", "report": "runs", "reproduce": "what"}

@@ -13,6 +13,7 @@ from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep, Override
+from hydra.core.plugins import Plugins
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -20,6 +21,8 @@ from omegaconf.errors import OmegaConfBaseException
 from berteam_cli.catalogue import groups
 from berteam_cli.config import checked, one_line, register
 from berteam_cli.errors import InputError, did_you_mean
+from hydra_plugins.berteam.ray_launcher import RayLauncher
+from hydra_plugins.berteam.sweeper import BerteamSweeper
 
 CONF = "berteam_cli.conf"
 REFUSALS = (HydraException, OmegaConfBaseException, OSError, OverflowError, ValueError, RecursionError)
@@ -35,8 +38,13 @@ UNUSED = {
 
 
 def prepare() -> None:
-    """Registers the schemas and the one resolver that the yaml files use."""
+    """Registers the schemas, the one resolver that the yaml files use, and our plugins of Hydra.
+
+    Hydra finds plugins by walking over folders, which misses those of an editable installation.
+    """
     register()
+    for plugin in (BerteamSweeper, RayLauncher):
+        Plugins.instance().register(plugin)
     OmegaConf.register_new_resolver("eighth_of", lambda epochs: int(epochs) // 8, replace=True)
 
 
@@ -123,12 +131,16 @@ def check_sweep_folder(overrides: list[Override]) -> None:
         InputError: it does.
     """
     from berteam_cli.folder import MANIFEST  # noqa: PLC0415 (it brings torch, which --help does not need)
+    from berteam_cli.sweep.folder import JOBS  # noqa: PLC0415 (as above)
 
     for override in overrides:
         if override.key_or_group == "hydra.sweep.dir":
             folder = Path(str(override.value()))
-            if folder.is_dir() and any((job / MANIFEST).exists() for job in folder.iterdir()):
-                raise InputError(f"hydra.sweep.dir={folder} holds a sweep already; choose another folder.")
+            if (folder / JOBS).exists() or (folder.is_dir() and any((x / MANIFEST).exists() for x in folder.iterdir())):
+                raise InputError(
+                    f"hydra.sweep.dir={folder} holds a sweep already; choose another folder, "
+                    f"or go on with it: berteam sweep --resume {folder}"
+                )
 
 
 def parsed(overrides: list[str]) -> list[Override]:

@@ -8,12 +8,12 @@ from typing import Any
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from berteam_cli.command import sweep
 from berteam_cli.command.train import train
 from berteam_cli.config import checked, one_line
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.folder import read_manifest
 from berteam_cli.stored import MAY_CHANGE, stored_config, whole_choice
+from berteam_cli.sweep.folder import JOBS, working, write_table
 from berteam_cli.trust import told
 
 
@@ -55,7 +55,8 @@ def resume(folder: Path, overrides: list[str]) -> float:
     except OmegaConfBaseException as error:
         raise InputError(one_line(error)) from error
     try:
-        return train(checked(config), OmegaConf.to_yaml(config), folder)
+        with working(folder):
+            return train(checked(config), OmegaConf.to_yaml(config), folder)
     finally:
-        if (folder.parent / sweep.TABLE).exists():
-            sweep.write(folder.parent)
+        if (folder.parent / JOBS).exists():
+            write_table(folder.parent)

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from berteam_cli.workers import available_cores
-from tests.bench import evaluating, games, learning, reporting, selecting, starting, training
+from tests.bench import evaluating, games, learning, reporting, selecting, starting, sweeping, training
 
 
 def main() -> None:
@@ -22,15 +22,8 @@ def main() -> None:
     for column in ("what", "here", "target"):
         table.add_column(column, justify="left" if column == "what" else "right")
     torch.set_num_threads(1)
-    for rows in (
-        *starting.ROWS,
-        *games.ROWS,
-        *evaluating.ROWS,
-        *learning.ROWS,
-        *selecting.ROWS,
-        *training.ROWS,
-        *reporting.ROWS,
-    ):
+    measured = (starting, games, evaluating, learning, selecting, training, sweeping, reporting)
+    for rows in (rows for module in measured for rows in module.ROWS):
         for row in rows():
             table.add_row(*row)
             print(*row, sep=" | ", flush=True)
