@@ -31,6 +31,10 @@ log = logging.getLogger("berteam")
 
 GAMES_A_TASK = 64  # at most: some tenths of a second, which is what the death of a worker may lose
 TASKS_A_PROCESSOR = 8  # at least, where there are so many games: enough that processors end together
+QUIET = {
+    "RAY_USAGE_STATS_ENABLED": "0",  # nothing is sent anywhere
+    "RAY_NUM_REDIS_GET_RETRIES": "1",  # of 40 s each, to find a cluster; Ray takes 20
+}
 LIVES = 20  # deaths of workers and machines that a task outlives
 PATIENCE_S = 60.0  # without a result, before that is told
 
@@ -188,7 +192,8 @@ def connect() -> None:
     Raises:
         InputError: Ray is not installed, or there is no cluster at RAY_ADDRESS.
     """
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
     try:
         from ray import init, is_initialized  # noqa: PLC0415 (an extra)
     except ImportError as error:
