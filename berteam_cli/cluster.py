@@ -30,7 +30,7 @@ from berteam_cli.outcomes import Ints
 log = logging.getLogger("berteam")
 
 GAMES_A_TASK = 64  # at most: some tenths of a second, which is what the death of a worker may lose
-TASKS_A_PROCESSOR = 8  # at least, where there are so many games: enough that processors end together
+TASKS_A_PROCESSOR = 4  # at least, where there are so many games: enough that processors end together
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",  # nothing is sent anywhere
     "RAY_NUM_REDIS_GET_RETRIES": "1",  # of 40 s each, to find a cluster; Ray takes 20

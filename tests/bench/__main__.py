@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from berteam_cli.workers import available_cores
-from tests.bench import evaluating, games, learning, reporting, selecting, training
+from tests.bench import cluster, evaluating, games, learning, reporting, selecting, training
 
 
 def main() -> None:
@@ -22,7 +22,15 @@ def main() -> None:
     for column in ("what", "here", "target"):
         table.add_column(column, justify="left" if column == "what" else "right")
     torch.set_num_threads(1)
-    for rows in (*games.ROWS, *evaluating.ROWS, *learning.ROWS, *selecting.ROWS, *training.ROWS, *reporting.ROWS):
+    for rows in (
+        *games.ROWS,
+        *evaluating.ROWS,
+        *cluster.ROWS,
+        *learning.ROWS,
+        *selecting.ROWS,
+        *training.ROWS,
+        *reporting.ROWS,
+    ):
         for row in rows():
             table.add_row(*row)
             print(*row, sep=" | ", flush=True)
