@@ -10,7 +10,8 @@ from typing import Any
 
 import torch
 
-from berteam_cli.config_commands import CommandConfig, TrainConfig
+from berteam_cli.cluster import Cluster
+from berteam_cli.config_commands import RAY, CommandConfig, TrainConfig
 from berteam_cli.config_groups import EnvConfig, OptimizerConfig
 from berteam_cli.env.base import Env, blank_trajectories
 from berteam_cli.env.mctf import Mctf
@@ -60,8 +61,23 @@ OPTIMIZERS: dict[str, type[Fixed]] = {
 
 
 def games(config: CommandConfig) -> Games:
-    """Returns the game that ``config`` describes, with its threads."""
-    return Games(env(config.env, config.team_size), Workers(config.workers or available_cores()))
+    """Returns the game that ``config`` describes, and who plays it.
+
+    Raises:
+        InputError: the game's settings do not go together, or nobody can play it.
+    """
+    return played_by(config.workers, env(config.env, config.team_size))
+
+
+def played_by(workers: int | str, game: Env) -> Games:
+    """Returns ``game`` with as many threads, or with as many as there are cores if ``workers`` is 0 or "ray".
+
+    Raises:
+        InputError: Ray is to play, and is not there.
+    """
+    if workers == RAY:
+        return Games(game, Workers(available_cores()), Cluster())
+    return Games(game, Workers(int(workers) or available_cores()))
 
 
 def env(config: EnvConfig, team_size: int) -> Env:

@@ -7,7 +7,7 @@ from typing import Any
 
 from omegaconf import MISSING
 
-from berteam_cli.bounds import choice, number
+from berteam_cli.bounds import choice, number, number_or
 from berteam_cli.config_groups import (
     EnvConfig,
     EvaluationConfig,
@@ -18,6 +18,9 @@ from berteam_cli.config_groups import (
     SelectorConfig,
 )
 
+RAY = "ray"
+"""Who plays, if not so many threads."""
+
 
 @dataclass
 class CommandConfig:
@@ -27,7 +30,7 @@ class CommandConfig:
     team_size: int = number(1, 512)
     out: str | None = MISSING
     on_exists: str = choice("error", "overwrite", "resume")
-    workers: int = number(0, 4096)
+    workers: Any = number_or(RAY, 0, 4096)  # noqa: RUF009 (it declares)
     env: EnvConfig = MISSING
 
 
@@ -98,7 +101,7 @@ class OutputConfig:
     """What commands share that look at runs which are there."""
 
     seed: int = number(0, 2**63 - 1)
-    workers: int = number(0, 4096)
+    workers: Any = number_or(RAY, 0, 4096)  # noqa: RUF009 (it declares)
     trust: Any = MISSING
 
 
@@ -136,7 +139,7 @@ class ReproduceConfig:
     what: str = choice("paper_fixed", "paper_coevolution", "paper_comparison")
     scale: float = number(0, 1, open_low=True)
     seeds: list[int] = MISSING
-    workers: int = number(0, 4096)
+    workers: Any = number_or(RAY, 0, 4096)  # noqa: RUF009 (it declares)
     out: str | None = MISSING
 
 

@@ -1,10 +1,10 @@
-"""Plays line-ups: from teams to outcomes and experience. The only place that hands games to threads."""
+"""Plays line-ups: from teams to outcomes and experience. The only place that hands games to threads and machines."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,17 +19,28 @@ GAMES_A_CALL = 8  # at most: enough that calling costs nothing
 CALLS = 32  # at least, where there are so many games: enough that threads end together
 
 
+class Elsewhere(Protocol):
+    """Other machines than this one."""
+
+    def play(
+        self, env: Env, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results
+    ) -> None:
+        """Plays all games to their ends, and fills ``results``; see ``Env.play``."""
+
+
 @dataclass(frozen=True)
 class Games:
-    """A kind of game and the threads that play it.
+    """A kind of game and who plays it.
 
     Attributes:
         env: the game.
-        workers: the threads.
+        workers: threads that play, and do what else there is to do.
+        elsewhere: machines that play in their place, if any.
     """
 
     env: Env
     workers: Workers
+    elsewhere: Elsewhere | None = None
 
     def play(
         self,
@@ -42,8 +53,8 @@ class Games:
     ) -> tuple[Outcomes, Experience]:
         """Returns the outcomes of all ``lineups``, and what the players saw and did.
 
-        Every game draws from its own stream, made from ``key`` and its index, so that neither the number of threads nor
-        the other games change it.
+        Every game draws from its own stream, made from ``key`` and its index, so that neither who plays it nor the
+        other games change it.
 
         Args:
             policies: how the members of the line-ups act.
@@ -58,18 +69,26 @@ class Games:
         players = np.ascontiguousarray(lineups.teams.reshape(games, self.env.sides * self.env.team_size))
         seeds = seeds_of(key, games)
         results = blank_results(self.env, games, record=record, room=room)
-        each = min(GAMES_A_CALL, max(1, games // CALLS))
         try:
-            self.workers.map(
-                lambda start: self.env.play(range(start, min(start + each, games)), players, policies, seeds, results),
-                range(0, games, each),
-            )
+            if self.elsewhere is not None:
+                self.elsewhere.play(self.env, players, policies, seeds, results)
+            else:
+                self.play_here(players, policies, seeds, results)
         except BaseException:  # Ctrl-C among others
             if isinstance(self.env, Stoppable):
                 self.env.stop()
             raise
         outcomes = Outcomes(lineups, results.scores, results.steps, results.events, seeds)
         return outcomes, experience_of(players, results)
+
+    def play_here(self, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results) -> None:
+        """Plays all games on the threads, and fills ``results``; see ``Env.play``."""
+        games = len(seeds)
+        each = min(GAMES_A_CALL, max(1, games // CALLS))
+        self.workers.map(
+            lambda start: self.env.play(range(start, min(start + each, games)), players, policies, seeds, results),
+            range(0, games, each),
+        )
 
 
 def experience_of(players: Ints, results: Results) -> Experience:

@@ -14,12 +14,12 @@ from berteam_cli.stored import plain_config, stored_config
 from berteam_cli.training import Parts, Run
 
 
-def last_state(folder: Path, workers: int | None = None, trust: Collection[str] = ()) -> tuple[Parts, Run]:
+def last_state(folder: Path, workers: int | str = 0, trust: Collection[str] = ()) -> tuple[Parts, Run]:
     """Returns the parts of the run in ``folder`` and its newest checkpoint that is whole.
 
     Args:
         folder: of the run.
-        workers: threads that play; 0: as many as there are cores; None: as many as the run had.
+        workers: who plays, as of the config key.
         trust: what the run's game may import.
 
     Raises:
@@ -27,8 +27,7 @@ def last_state(folder: Path, workers: int | None = None, trust: Collection[str] 
     """
     read_manifest(folder)
     config = checked(stored_config(folder, trust))
-    if workers is not None:
-        config.workers = workers
+    config.workers = workers
     parts = build.parts_to_read(config)
     try:
         return parts, checkpoint.load(folder, parts).run

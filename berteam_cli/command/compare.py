@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from berteam_cli import build
 from berteam_cli.command.inspect import narrow, printed, read_table
 from berteam_cli.config_commands import CompareConfig
 from berteam_cli.errors import InputError
@@ -21,7 +22,6 @@ from berteam_cli.evaluation.playing import play_all
 from berteam_cli.evaluation.reference import reference
 from berteam_cli.evaluation.sheet import forget
 from berteam_cli.folder import logging_to, new_folder
-from berteam_cli.games import Games
 from berteam_cli.outcomes import Ints
 from berteam_cli.rating.bootstrap import superiority, with_interval
 from berteam_cli.records import COLUMNS, write_table
@@ -29,7 +29,6 @@ from berteam_cli.stored import begun
 from berteam_cli.terminal import berteam, console, end
 from berteam_cli.training import key
 from berteam_cli.trust import trusted
-from berteam_cli.workers import Workers, available_cores
 
 log = logging.getLogger("berteam")
 
@@ -52,6 +51,7 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
     runs = contenders([Path(x) for x in config.runs], trusted(config.trust))
     names, of = algorithms(runs)
     seconds = [times(x.folder) for x in runs]
+    games = build.played_by(config.workers, runs[0].parts.games.env)
     folder = folder or new_folder("compare")
     if any(folder.resolve() == x.folder.resolve() for x in runs):
         raise InputError(f"out={folder} is one of the runs; choose another folder.")
@@ -65,7 +65,6 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
     ):
         for sentence in broken:
             log.info("%s.", sentence)
-        games = Games(runs[0].parts.games.env, Workers(config.workers or available_cores()))
         known = reference(games, config.reference_teams)
         rng = np.random.default_rng(config.seed)
         plan = planned(runs, of, known, games.env.standard_policies, config.games, config.reference_games, rng)

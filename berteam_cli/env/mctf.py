@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,6 +37,7 @@ class Mctf:
         rules: of the game.
         reward: what learners are paid for.
         scale: (2, O) ranges of what players see.
+        given: the settings it was made from, besides team_size.
     """
 
     team_size: int
@@ -44,6 +46,7 @@ class Mctf:
     scale: npt.NDArray[np.float32]
     observation_size: int
     longest: int
+    given: Mapping[str, Any]
     name: str = "mctf"
     sides: int = 2
     actions: int = ACTIONS
@@ -68,6 +71,11 @@ class Mctf:
         object.__setattr__(self, "scale", ranges(rules))
         object.__setattr__(self, "observation_size", self.scale.shape[1])
         object.__setattr__(self, "longest", longest)
+        object.__setattr__(self, "given", {"reward": reward, "reward_weights": reward_weights, **settings})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Returns how it is made again elsewhere: a compiled reward cannot travel, but its name can."""
+        return partial(Mctf, self.team_size, **self.given), ()
 
     def play(  # noqa: D102
         self, games: range, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results

@@ -204,6 +204,10 @@ class Processes:
         self.stopped = False
         Finalize(self, close, args=(self.idle,), exitpriority=1)  # before they are killed
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Returns how it is made on another machine, which has processes of its own."""
+        return Processes, (self.game,)
+
     @contextmanager
     def one(self) -> Iterator[WorkerProcess]:
         """Gives a process to whoever asks; if what is done with it fails, it ends."""
