@@ -6,14 +6,13 @@ So `--help`, `berteam list` and completion answer at once. What a config then re
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from berteam_cli import conf
-
-CONF = Path(conf.__path__[0])
+CONF = Path(str(files("berteam_cli.conf").joinpath("train.yaml"))).parent
 
 
 def groups() -> list[str]:
@@ -67,7 +66,7 @@ def whole(group: str, option: str) -> dict[str, Any]:
     """Returns the values of a choice, with those of the choices that it includes."""
     if option not in choices(group):
         return {}
-    own, values = read(CONF / group / f"{option}.yaml"), {}
+    own, values = read(CONF / group / f"{option}.yaml"), dict[str, Any]()
     for name, included in defaults(own):
         other, _, place = name.partition("@")
         if not other:  # a choice of the same group that this one begins with

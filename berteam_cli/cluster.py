@@ -130,7 +130,8 @@ class Cluster:
             for k, start in enumerate(starts):
                 processor, played = self.waited(pending[k])
                 self.look(processor)
-                for column, part in zip(results, played, strict=True):
+                columns: tuple[Any, ...] = results
+                for column, part in zip(columns, played, strict=True):
                     column[start : start + len(part)] = part
         except BaseException:  # Ctrl-C among others
             for reference in pending:
@@ -205,7 +206,7 @@ def connect() -> None:
     if is_initialized():
         return
     address = os.environ.get("RAY_ADDRESS")
-    quiet = {"logging_level": logging.ERROR, "log_to_driver": False, "include_dashboard": False}
+    quiet: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False, "include_dashboard": False}
     try:
         with own_handler():
             if address:

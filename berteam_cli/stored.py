@@ -95,7 +95,7 @@ def stored_config(folder: Path, trust: Collection[str] = ()) -> DictConfig:
             typed.population.islands[name] = OmegaConf.structured(IslandConfig)
             typed.population.islands[name].learner = OmegaConf.structured(SCHEMAS["learner"][island.learner.name])
         config = cast("DictConfig", OmegaConf.merge(typed, plain))
-        env = OmegaConf.to_object(config.env)
+        env: Any = OmegaConf.to_object(config.env)
     except (OmegaConfBaseException, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
         said = first_line(error)
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error

@@ -128,7 +128,6 @@ def show(folder: Path, top: int) -> None:
     """
     out = console()
     if (folder / "sweep.csv").exists():
-        shown = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
         columns = ["job", "overrides", "status", "expected_elo", "best_team", "best_elo", "wall_s"]
         try:
             table = pd.read_csv(folder / "sweep.csv", dtype=WHOLE)[columns]
@@ -139,8 +138,8 @@ def show(folder: Path, top: int) -> None:
         return
     manifest = read_manifest(folder)
     say(f"{folder}: {manifest['status']}, started {manifest['started']}")
-    shown = ("summary", "elo", "team_distribution", "agents", "pairs")
-    tables = {name: read_table(folder, name, whole=manifest["status"] == "done") for name in shown}
+    names = ("summary", "elo", "team_distribution", "agents", "pairs")
+    tables = {name: read_table(folder, name, whole=manifest["status"] == "done") for name in names}
     summary, elo, teams, agents = (tables[x] for x in ("summary", "elo", "team_distribution", "agents"))
     if summary is not None and len(summary):
         out.print(printed("Figures", summary.T.reset_index().set_axis(["figure", "value"], axis=1)))

@@ -79,7 +79,7 @@ def kernels() -> Iterator[Finding]:
     import numba  # noqa: PLC0415 (slow)
     import numpy as np  # noqa: PLC0415
 
-    if numba.config.DISABLE_JIT:
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # numba sets it as it is imported
         yield Finding(PROBLEM, "kernels", "NUMBA_DISABLE_JIT makes games hundreds of times slower", "unset it")
         return
     from berteam_cli.acting import fixed_policies  # noqa: PLC0415 (slow)
@@ -97,7 +97,7 @@ def kernels() -> Iterator[Finding]:
     begun = time.perf_counter()
     outcomes, _ = games.play(players, lineups, 0)
     again = time.perf_counter() - begun
-    cache = Path(step._cache.cache_path)
+    cache = Path(step._cache.cache_path)  # type: ignore[attr-defined]  # of the compiled function
     said = f"a game of {int(outcomes.steps[0])} steps in {1000 * again:.1f} ms"
     if again > SLOW_S:
         yield Finding(NOTE, "kernels", f"{said}, which takes milliseconds elsewhere", "see whether the machine is busy")

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy.typing as npt
 
 
 def check_columns(
-    columns: Mapping[str, npt.NDArray], one: Mapping[str, npt.NDArray], actions: int, free: Collection[str] = ()
+    columns: Mapping[str, npt.NDArray[Any]],
+    one: Mapping[str, npt.NDArray[Any]],
+    actions: int,
+    free: Collection[str] = (),
 ) -> None:
     """Checks arrays that a file gave.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -64,7 +64,8 @@ def remember(ring: Replay, collected: int, experience: Experience, game: int, pl
         How many steps the member has made now.
     """
     at, new = latest(len(ring.actions), collected, experience, game, player)
-    for kept, column in zip(ring, new, strict=True):
+    columns: tuple[Any, ...] = ring
+    for kept, column in zip(columns, new, strict=True):
         kept[at] = column
     return collected + int(experience.lengths[game])
 

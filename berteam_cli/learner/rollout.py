@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -117,7 +117,8 @@ def append(rollouts: Steps, filled: Ints, row: int, new: Steps, start: int) -> i
     """
     at = filled[row]
     count = min(rollouts.actions.shape[1] - at, len(new.actions) - start)
-    for kept, column in zip(rollouts, new, strict=True):
+    columns: tuple[Any, ...] = rollouts
+    for kept, column in zip(columns, new, strict=True):
         kept[row, at : at + count] = column[start : start + count]
     filled[row] += count
     return int(count)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import torch
 from numpy.random import Generator
 from torch import Tensor
@@ -56,6 +57,7 @@ class StackedDqn(Dqn):
         for row, games in trajectories.items():
             for game, player in games:
                 at, new = latest(self.buffer_size, int(state.collected[row]), experience, game, player)
+                column: npt.NDArray[Any]
                 for kept, column in zip(state.replay, new, strict=True):
                     kept[row, on(self.device, at)] = on(self.device, column)
                 state.collected[row] += experience.lengths[game]

@@ -117,7 +117,12 @@ def make_table(folder: Path) -> None:
         rows = []
         for job, words in sorted(sweep.jobs.items()):
             status, facts = sweep.status(job)
-            row = {"job": job, "overrides": " ".join(words), "status": status, "error": facts.get("error", "")}
+            row: dict[Any, Any] = {
+                "job": job,
+                "overrides": " ".join(words),
+                "status": status,
+                "error": facts.get("error", ""),
+            }
             summary = folder / str(job) / "summary.csv"
             if status == "done" and summary.exists():
                 row |= pd.read_csv(summary, dtype={"best_team": str}).iloc[0].to_dict()

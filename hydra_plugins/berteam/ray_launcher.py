@@ -28,7 +28,7 @@ class RayLauncher(Launcher):
 
     def __init__(self, ray: DictConfig) -> None:
         """Takes ``init`` and ``remote``, the arguments of ray.init and ray.remote."""
-        self.ray = OmegaConf.to_container(ray, resolve=True)
+        self.ray: Any = OmegaConf.to_container(ray, resolve=True)
 
     def setup(self, *, hydra_context: HydraContext, task_function: TaskFunction, config: DictConfig) -> None:
         """Takes what each job needs."""
