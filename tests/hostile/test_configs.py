@@ -44,7 +44,7 @@ def test_a_config_in_a_folder_is_values_and_nothing_else(k, run, berteam):
         assert "has a tag, an alias or an interpolation, and no value" in said
 
 
-@pytest.mark.parametrize("name", ["../../x", "/tmp/x", "=1+1", "<b>", "\x1b[2J", "a b", "nan", "[red]"])
+@pytest.mark.parametrize("name", ["../../x", "=1+1", "<b>", "\x1b[2J"])
 def test_an_island_in_a_folder_has_a_name_that_tables_and_paths_can_hold(name, run, berteam):
     folder = run("hands")
     changed(folder, "    hands:", f"    {json.dumps(name)}:")
