@@ -29,9 +29,9 @@ class Block:
 
     @property
     def file(self):
-        """The path that its first line names, in a comment; None where it names none."""
-        named = re.fullmatch(r"# ([\w./]+\.(?:py|yaml))", self.lines[0])
-        return named and named[1]
+        """The path that one of its first two lines names, in a comment; None where none does."""
+        named = [re.fullmatch(r"# ([\w./]+\.(?:py|yaml))", line) for line in self.lines[:2]]
+        return next((x[1] for x in named if x), None)
 
     @property
     def commands(self):

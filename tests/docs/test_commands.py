@@ -4,6 +4,7 @@ Those of a page run in its order and in one folder: first its blocks, then the l
 changed by WORDS and LESS only. What is not run stands in MADE, CHECKED or NAMED, with the reason.
 """
 
+import itertools
 import re
 import shlex
 import shutil
@@ -20,13 +21,7 @@ LESS = {
     "train": SMALL,
     "resume": ["epochs=4"],
     "tournament": ["games_per_pair=2"],
-    "evaluate": [
-        "games_per_pair=1",
-        "aggression_games=1",
-        "replay_games=1",
-        "payoff_games=2",
-        *("teams_at_most=4", "reference_teams=4"),
-    ],
+    "evaluate": ["games_per_pair=1", "aggression_games=1", "replay_games=1", "reference_teams=4", "most=0"],
     "compare": ["games=8", "reference_games=8", "reference_teams=2"],
 }
 """What is said behind the line of each command, and so in place of what the line itself says of these keys."""
@@ -55,7 +50,8 @@ CHECKED = {
 """Lines that are composed and checked as a whole, as the command does before it begins, but not run; and why."""
 
 RUN_ON = {"README.md", "tutorial.md"}
-"""Pages whose trainings are run. Those of other pages differ from them in values alone, which are checked."""
+COMPOSED = {"train", "evaluate", "compare", "report", "tournament"}
+"""Lines of these commands are run on those pages; on others, where only their values differ, those are checked."""
 
 NAMED = "a command's name alone, in a sentence"
 
@@ -115,7 +111,7 @@ def test_what_a_page_shows_runs(page, runs, berteam, tmp_path):
             subprocess.run(["make", "-n", *words], cwd=ROOT, check=True, capture_output=True)
         elif kind == "sentence" and len(words) < 2 and (not words or words[0] in set(cli.WORDS) - {"list", "doctor"}):
             continue  # NAMED
-        elif any(re.match(pattern, said) for pattern in CHECKED) or (words[0] == "train" and page.name not in RUN_ON):
+        elif any(re.match(pattern, said) for pattern in CHECKED) or (words[0] in COMPOSED and page.name not in RUN_ON):
             checked(*words)
             for out in re.findall(r"\bout=(\S+)", said):
                 shutil.copytree(runs / "of_page", tmp_path / out)
@@ -127,6 +123,9 @@ def test_what_a_page_shows_runs(page, runs, berteam, tmp_path):
 def checked(word, *words):
     """Does with a line what the command does before it begins."""
     prepare()
+    words = list(words)
     if word in cli.LEADING:  # as cli.about says it
-        words = [f"{cli.LEADING[word]}={words[0]}", *words[1:]]
-    check(word, spelt_out(list(words)), lambda config, keys: cli.verify(word, config, keys))
+        named = list(itertools.takewhile(lambda x: "=" not in x, words))
+        value = f"[{','.join(named)}]" if cli.LEADING[word] == "runs" else named[0]
+        words = [f"{cli.LEADING[word]}={value}", *words[len(named) :]]
+    check(word, spelt_out(words), lambda config, keys: cli.verify(word, config, keys))
