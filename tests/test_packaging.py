@@ -27,15 +27,16 @@ def wheel(tmp_path_factory):
 
 def test_the_wheel_holds_what_it_should(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
-    kept = ("conf/**/*.yaml", "berteam_cli/**/*.py", "berteam_cli/**/*.csv", "berteam_cli/**/page.*")
+    code = ("berteam_cli/**/*.py", "hydra_plugins/**/*.py")
+    kept = ("conf/**/*.yaml", *code, "berteam_cli/**/*.csv", "berteam_cli/**/page.*")
     for path in (path for pattern in kept for path in ROOT.glob(pattern)):
         inside = path.relative_to(ROOT).as_posix()
-        inside = inside if inside.startswith("berteam_cli") else f"berteam_cli/{inside}"
+        inside = inside if inside.startswith(("berteam_cli", "hydra_plugins")) else f"berteam_cli/{inside}"
         assert inside in names
     for path in (*ROOT.glob("envs/*/*.py"), *ROOT.glob("envs/mctf/page.*")):
         assert path.relative_to(ROOT / "envs").as_posix() in names
     tops = {name.split("/")[0] for name in names if not name.split("/")[0].endswith(".dist-info")}
-    assert tops == {"berteam_cli", "mctf", "rps"}
+    assert tops == {"berteam_cli", "hydra_plugins", "mctf", "rps"}
 
 
 def test_the_installed_wheel_trains(wheel, tmp_path):
