@@ -11,6 +11,7 @@ from typing import Any
 
 from berteam_cli.compose import arguments, prepare
 from berteam_cli.errors import InputError, RunError
+from berteam_cli.quiet import written
 from berteam_cli.sweep import plan
 from berteam_cli.sweep.folder import LOCKS, TABLE, Sweep, working
 from berteam_cli.sweep.job import STOP
@@ -167,6 +168,7 @@ def carry_out(folder: Path, words: list[str], launch: Launch, *, ours: bool = Tr
     settings = [word for word in arguments(words).overrides if plan.of_hydra(word)]
     how = [word for word in settings if not word.startswith("hydra.sweep.dir=")]
     again = shlex.join(["berteam", "sweep", "--resume", str(folder), *flags[1:], *how])
+    written(folder)
     print(f"{folder}: see {folder / TABLE}", flush=True)
     with working(folder / "sweep"):
         (folder / LOCKS / STOP).unlink(missing_ok=True)

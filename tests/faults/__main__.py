@@ -1,10 +1,13 @@
 """Tries all faults and prints how many were survived: `python -m tests.faults [short] [seed=N]`.
 
+Wrong command lines, which the tests try too, are left out of the short version.
+
 The exit code is 1 if one was not.
 """
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import tempfile
 import time
@@ -54,6 +57,8 @@ def main(words: list[str]) -> int:
             print(f"{title}: survived {tried - lost} of {tried} {took}" if tried else f"{title}: not to be had here")
             sys.stdout.flush()
             failures += lost
+    if not short:
+        failures += subprocess.run([sys.executable, "-m", "tests.faults_config"], check=False).returncode
     return failures
 
 
