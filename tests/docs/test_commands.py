@@ -33,12 +33,14 @@ WORDS = (
     (r"\bRUN RUN\b", "outputs/of_page outputs/another"),
     (r"\bRUN\b", "outputs/of_page"),
     (r"\bWHAT\b", "paper_fixed"),
+    (r"\bexperiment=NAME\b", "experiment=quickstart"),
+    (r"\btrain (?!.*(population|experiment|env)=).*", r"\g<0> population=islands4x3"),
     (r"\bDIR/0\b", "outputs/of_page"),
     (r"(?<!\S)\.\.\.(?!\S)", ""),
 )
-"""What is said in place of words that stand for something of the reader's."""
+"""What is said in place of words that stand for something of the reader's, and of the usual population of 60."""
 
-CODE = {"np.arange(1000)": "np.arange(70)"}
+CODE = {"np.arange(1000)": "np.arange(8)"}
 """What is done in place of parts of Python blocks that take long."""
 
 MADE = "make: sets up environments, or runs what takes minutes, these tests among it; `make -n` tells that it could"
