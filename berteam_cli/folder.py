@@ -59,7 +59,7 @@ def claim(folder: Path, on_exists: str) -> None:
         (folder / LOG).touch()
     except OSError as error:
         for path in reversed(made):
-            if path.is_dir():
+            if os.path.isdir(path):
                 path.rmdir()
         raise InputError(f"out={folder} cannot be written: {error.strerror or error}.") from error
 
