@@ -34,7 +34,7 @@ WORDS = (
     (r"\bRUN\b", "outputs/of_page"),
     (r"\bWHAT\b", "paper_fixed"),
     (r"\bexperiment=NAME\b", "experiment=quickstart"),
-    (r"\btrain (?!.*(population|experiment|env)=).*", r"\g<0> population=islands4x3"),
+    (r"\btrain (?!.*((population|experiment|env)=|--cfg)).*", r"\g<0> population=islands4x3"),
     (r"\bDIR/0\b", "outputs/of_page"),
     (r"(?<!\S)\.\.\.(?!\S)", ""),
 )
