@@ -113,18 +113,25 @@ def composed(word: str, words: list[str]) -> None:
     prepare()
     words = spelt_out(words)
     given = arguments(words)
-    if not (given.hydra_help or given.shell_completion):
-        checked_words(word, words)
-    if given.multirun and not (given.hydra_help or given.shell_completion or given.cfg or given.info):
+    if given.hydra_help or given.shell_completion:
+        launch(word, words)
+        return
+    config = checked_words(word, words)
+    if given.cfg or given.info or (not given.multirun and any("hydra" in x for x in given.overrides)):
+        launch(word, words)
+    elif given.multirun:
         from berteam_cli.command.sweep import multirun  # noqa: PLC0415
 
         multirun(word, words, launch)
-    else:
-        launch(word, words)
+    else:  # Hydra would compose the same again, twice, which takes a second
+        sys.argv = [f"berteam {word}", *words]
+        alone(word, config)
 
 
-def checked_words(word: str, words: list[str]) -> None:
+def checked_words(word: str, words: list[str]) -> DictConfig:
     """Checks the words of a command that Hydra composes, and of each job where they are a sweep's.
+
+    Returns the config, of a sweep that of its last job.
 
     Raises:
         InputError: they are wrong.
@@ -134,7 +141,7 @@ def checked_words(word: str, words: list[str]) -> None:
 
     given = arguments(words)
     check_launcher(given.overrides)
-    check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
+    return check(word, words, lambda config, keys: None if given.cfg or given.info else verify(word, config, keys))
 
 
 def launch(word: str, words: list[str]) -> None:
@@ -195,16 +202,21 @@ def perform(word: str, cfg: DictConfig) -> float:
         from berteam_cli.sweep.process import perform_job  # noqa: PLC0415
 
         return perform_job(word, cfg, HydraConfig.get(), command_of)
+    try:
+        return alone(word, cfg)
+    except (InputError, RunError) as error:  # past Hydra, which would print a traceback
+        refuse(error)
+
+
+def alone(word: str, cfg: DictConfig) -> float:
+    """Runs a command that is no job of a sweep with its config; returns what it returns."""
     from omegaconf import OmegaConf  # noqa: PLC0415
 
     from berteam_cli.config import checked  # noqa: PLC0415
 
     config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
     out = getattr(config, "out", None)
-    try:
-        return command_of(word)(config, text, Path(out) if out else None)
-    except (InputError, RunError) as error:  # past Hydra, which would print a traceback
-        refuse(error)
+    return command_of(word)(config, text, Path(out) if out else None)
 
 
 def refuse(error: InputError | RunError) -> NoReturn:

@@ -73,8 +73,8 @@ def arguments(words: list[str]) -> Any:
     return given
 
 
-def check(command: str, words: list[str], verify: Callable[[Any, list[str]], object]) -> None:
-    """Composes what the command line asks for and checks it, every value of a sweep once.
+def check(command: str, words: list[str], verify: Callable[[Any, list[str]], object]) -> DictConfig:
+    """Composes what the command line asks for and checks it, every value of a sweep once; returns it, of the last job.
 
     Args:
         command: name of the primary config.
@@ -102,6 +102,7 @@ def check(command: str, words: list[str], verify: Callable[[Any, list[str]], obj
             config = composed(given.config_name or command, searched, job)
             check_learner(config, job)
             verify(checked(config), [x.key_or_group for x in job])
+    return config
 
 
 def config_of(command: str, words: list[str]) -> tuple[Any, str]:
