@@ -114,11 +114,11 @@ def test_an_evaluation_has_the_same_bytes_as_on_this_machine(machines, berteam, 
 
 
 def test_a_reward_of_the_users_own_travels_and_so_does_its_failure(machines, berteam, tmp_path):  # noqa: F811
-    (tmp_path / "own.py").write_text(OWN)
+    (tmp_path / "paid.py").write_text(OWN)
     said = {}
     for workers in ("1", "ray"):
-        berteam("train", *MCTF, "epochs=1", "env.reward=own:pay", f"workers={workers}", f"out=w{workers}")
-        words = ["env.reward=own:broken", f"workers={workers}", "out=broken", "on_exists=overwrite"]
+        berteam("train", *MCTF, "epochs=1", "env.reward=paid:pay", f"workers={workers}", f"out=w{workers}")
+        words = ["env.reward=paid:broken", f"workers={workers}", "out=broken", "on_exists=overwrite"]
         said[workers] = berteam("train", *MCTF, *words, code=3).stderr
     same_tables(tmp_path / "w1", tmp_path / "wray")
     assert "env.reward must give finite numbers, but failed or did not in game " in said["1"]

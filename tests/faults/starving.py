@@ -80,10 +80,7 @@ def read_only(place: Path, known: Whole) -> Iterator[tuple[str, str]]:
     for what, words in (("a new run", WORDS), ("a run that goes on", GO_ON)):
         fresh(place)
         if words is GO_ON:
-            child = started(place, *WORDS)
-            child.ended_within(known.seconds / 2)
-            child.kill()
-            child.ended()
+            broken_off(place, known.seconds / 2)
         before = {path: path.stat().st_mtime_ns for path in place.rglob("*") if path.name != "said.txt"}
         locked(place, writable=False)
         code, said = finished(place, *words, prepare=no_privilege)
@@ -91,6 +88,14 @@ def read_only(place: Path, known: Whole) -> Iterator[tuple[str, str]]:
         after = {path: path.stat().st_mtime_ns for path in place.rglob("*") if path.name != "said.txt"}
         wrong = refused(code, said) or ("" if after == before else "something was written")
         yield f"{what} in a folder that may only be read", wrong or wrong_at_last(place, known)
+
+
+def broken_off(place: Path, seconds: float) -> None:
+    """Leaves a run that was killed after so many ``seconds``, if it was not at its end before."""
+    child = started(place, *WORDS)
+    if child.ended_within(seconds) is None:
+        child.kill()
+        child.ended()
 
 
 def locked(place: Path, *, writable: bool) -> None:
@@ -128,10 +133,7 @@ def virtual_bytes(pid: int) -> int:
 def clock_set_back(place: Path, known: Whole) -> Iterator[tuple[str, str]]:
     """A run that goes on at what the clock says is ten years before it began, and whose clock then falls on."""
     fresh(place)
-    child = started(place, *WORDS)
-    child.ended_within(known.seconds * 0.6)
-    child.kill()
-    child.ended()
+    broken_off(place, known.seconds / 2)
     late = time.time() + 10 * 365 * 86400
     for path in (place / "run").rglob("*"):
         os.utime(path, (late, late))
