@@ -12,7 +12,18 @@ from rich.console import Console
 from rich.table import Table
 
 from berteam_cli.workers import available_cores
-from tests.bench import cluster, evaluating, games, learning, reporting, selecting, starting, sweeping, training
+from tests.bench import (
+    cluster,
+    evaluating,
+    games,
+    keeping,
+    learning,
+    reporting,
+    selecting,
+    starting,
+    sweeping,
+    training,
+)
 
 
 def main() -> None:
@@ -22,7 +33,7 @@ def main() -> None:
     for column in ("what", "here", "target"):
         table.add_column(column, justify="left" if column == "what" else "right")
     torch.set_num_threads(1)
-    measured = (starting, games, evaluating, cluster, learning, selecting, training, sweeping, reporting)
+    measured = (starting, games, evaluating, cluster, learning, selecting, training, keeping, sweeping, reporting)
     for rows in (rows for module in measured for rows in module.ROWS):
         for row in rows():
             table.add_row(*row)
