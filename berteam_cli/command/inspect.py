@@ -50,6 +50,8 @@ def read_table(
         if end < len(text) and whole:
             line = text.count(b"\n", 0, end) + 1
             raise InputError(f"{path} is cut off in the middle of line {line}; have it written anew.")
+        if not end and not whole:  # not even its columns are there yet
+            return None
         table = pd.read_csv(io.BytesIO(text[:end]), dtype=WHOLE)
     except (ValueError, OSError) as error:
         raise InputError(f"{path} cannot be read as a table: {error}.") from error
@@ -89,7 +91,7 @@ def inspect(folder: Path, top: int, overrides: Sequence[str] = ()) -> None:
     if others:
         raise InputError(f"{others[0]} is no key of berteam inspect; there is trust=module:function, and --top.")
     show(folder, top)
-    teams = read_table(folder, "team_distribution")
+    teams = read_table(folder, "team_distribution", whole=False)  # show has told if it must be
     if teams is not None and (teams.team == "other").any() and (folder / "checkpoint").exists():
         console().print(searched(folder, top, trust))
 

@@ -284,6 +284,22 @@ def test_train_goes_on_with_a_run_that_it_is_told(berteam, tmp_path):
     assert "nowhere is no folder of a run" in berteam("train", "resume=nowhere", code=2).stderr
 
 
+def test_a_run_killed_in_the_middle_of_rows_is_read(berteam, tmp_path):
+    words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=mcaa", "epochs=4", "out=run"]
+    berteam(*words, "evaluation.games=0", "record_every=2")
+    manifest = tmp_path / "run" / "manifest.json"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"status": "running"}))
+    for name in GROWING:
+        table = tmp_path / "run" / f"{name}.csv"
+        table.write_bytes(table.read_bytes()[:-3])
+    for name in ("elo", "summary"):
+        (tmp_path / "run" / f"{name}.csv").unlink()
+    for command in ("inspect", "report", "evaluate"):
+        berteam(command, "run")
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"status": "done"}))
+    assert "is cut off in the middle of line" in berteam("inspect", "run", code=2).stderr
+
+
 def test_a_run_without_a_checkpoint_begins_again(berteam, tmp_path):
     words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "epochs=2", "out=run"]
     berteam(*words)
