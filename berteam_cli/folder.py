@@ -92,6 +92,11 @@ def write_text(path: Path, text: str) -> None:
         raise
 
 
+def newest(folder: Path) -> int:
+    """Returns the epoch of the newest checkpoint in the run's ``folder``, whole or not; -1 if there is none."""
+    return max((int(path.name.removeprefix("epoch_")) for path in (folder / "checkpoint").glob("epoch_*")), default=-1)
+
+
 def missing(folder: Path) -> list[Path]:
     """Returns the folders that must be made for ``folder`` to be there, outermost first."""
     return [path for path in (*reversed(folder.parents), folder) if not os.path.exists(path)]

@@ -32,6 +32,8 @@ from berteam_cli.trust import trusted
 
 log = logging.getLogger("berteam")
 
+FEW = 30  # sampled teams, of which drawing them anew tells less scatter than there is
+
 TABLES = ("comparison", "runs", "versus")
 AGENTS_S = ("select_s", "play_s", "learn_s", "renew_s", "probe_s")  # the paper's time of agents
 
@@ -70,6 +72,12 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
         plan = planned(runs, of, known, games.env.standard_policies, config.games, config.reference_games, rng)
         sheet = folder / "checkpoint" / "played"
         outcomes = play_all(games, plan.acting, plan.lineups, key(rng), f"Comparing {len(runs)} runs", sheet)
+        if min(plan.teams) < FEW:
+            log.warning(
+                "Only %d teams of a run met the fixed ones: intervals of Elos are too narrow for so few; with a larger "
+                "reference_games there are more.",
+                min(plan.teams),
+            )
         played = counted(plan, outcomes, len(known.teams))
         found = compared(played, of, known, np.random.default_rng([config.seed, 1]))
         manifest.add(games=len(plan.lineups), reference=known.source)

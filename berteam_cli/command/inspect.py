@@ -14,7 +14,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from berteam_cli.errors import InputError, shown
-from berteam_cli.folder import read_manifest
+from berteam_cli.folder import MANIFEST, newest, read_manifest
+from berteam_cli.holding import in_use
 from berteam_cli.records import COLUMNS, EVALUATION
 from berteam_cli.terminal import berteam, console, end, say
 from berteam_cli.trust import told
@@ -139,7 +140,8 @@ def show(folder: Path, top: int) -> None:
         end(folder, ["sweep.csv"], f"{berteam('compare', [folder])}/*/")
         return
     manifest = read_manifest(folder)
-    say(f"{folder}: {manifest['status']}, started {manifest['started']}")
+    status = "broken off" if manifest["status"] == "running" and not in_use(folder) else manifest["status"]
+    say(f"{folder}: {status}, started {manifest['started']}")
     names = ("summary", "elo", "team_distribution", "agents", "pairs")
     tables = {name: read_table(folder, name, whole=manifest["status"] == "done") for name in names}
     summary, elo, teams, agents = (tables[x] for x in ("summary", "elo", "team_distribution", "agents"))
@@ -160,11 +162,11 @@ def show(folder: Path, top: int) -> None:
 
 def next_commands(folder: Path, status: str) -> list[str]:
     """Returns what to do next with a folder of that ``status``."""
-    trained = any((folder / "checkpoint").glob("epoch_*"))
+    epoch = newest(folder)
     if status == "done":
-        then = "evaluate" if trained and not (folder / EVALUATION).exists() else "report"
-        return [berteam(then, [folder])]
-    return [berteam("resume", [folder])] if trained and status != "running" else [berteam("inspect", [folder])]
+        seen = (folder / EVALUATION / MANIFEST).exists() and read_manifest(folder / EVALUATION).get("epoch") == epoch
+        return [berteam("report" if seen or epoch < 0 else "evaluate", [folder])]
+    return [berteam("inspect" if epoch < 0 or in_use(folder) else "resume", [folder])]
 
 
 def printed(title: str, frame: pd.DataFrame) -> Table:

@@ -67,6 +67,8 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         for remark in parts.selector.remarks():
             log.info("%s", remark)
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
+        if saved:
+            log.info("Going on after epoch %d of %d.", saved.run.epoch, config.epochs)
         manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
         with manifest.until_the_end(), stoppable() as stop:
             told: Any = OmegaConf.to_container(OmegaConf.create(text))

@@ -10,7 +10,8 @@ from typing import Any
 import pandas as pd
 
 from berteam_cli.command.inspect import read_table
-from berteam_cli.folder import CONFIG, read_manifest
+from berteam_cli.errors import InputError
+from berteam_cli.folder import CONFIG, newest, read_manifest
 from berteam_cli.records import COLUMNS, EVALUATION
 
 STATUS = {
@@ -53,7 +54,22 @@ class Source:
     @property
     def remark(self) -> str | None:
         """What must be said of the run before anything else."""
-        return STATUS.get(self.manifest["status"])
+        said = [STATUS[self.manifest["status"]]] if self.manifest["status"] in STATUS else []
+        if self.outdated:
+            said.append(
+                f"`berteam evaluate` looked at this run after epoch {self.outdated}; it has gone on since, so what was "
+                "found is left out. Evaluate it anew."
+            )
+        return " ".join(said) or None
+
+    @cached_property
+    def outdated(self) -> int:
+        """The epoch after which the run was evaluated, if it has gone on since; else 0."""
+        try:
+            evaluated = read_manifest(self.folder / EVALUATION).get("epoch", 0)
+        except InputError:
+            return 0
+        return int(evaluated) if evaluated != newest(self.folder) else 0
 
     def table(self, name: str) -> pd.DataFrame | None:
         """Returns a table of the run, None where there is none or it is empty.
@@ -64,11 +80,13 @@ class Source:
         return filled(read_table(self.folder, name, whole=self.whole))
 
     def evaluated(self, name: str) -> pd.DataFrame | None:
-        """Returns a table of the run's evaluation, None where there is none or it is empty.
+        """Returns a table of the run's evaluation, None where there is none, or it is empty or of an earlier epoch.
 
         Raises:
             InputError: it is cut off or not such a table.
         """
+        if self.outdated:
+            return None
         columns = FREE[name] if name in FREE else COLUMNS[name]
         return filled(read_table(self.folder / EVALUATION, name, columns=columns))
 

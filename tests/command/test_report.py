@@ -142,3 +142,18 @@ def test_without_matplotlib(berteam, tmp_path, monkeypatch):
     error = berteam("report", "run", code=2).stderr
     assert error.endswith("not installed: pip install 'berteam-cli[report]'.\n")
     assert not (tmp_path / "run" / "report").exists()
+
+
+def test_an_evaluation_of_an_earlier_epoch_is_left_out(berteam, tmp_path):
+    words = ["env=rps", "population=ppo6", "selector=mcaa", "games_per_epoch=4", "evaluation.games=400"]
+    berteam("train", *words, "epochs=2", "out=run")
+    berteam("evaluate", "run")
+    assert "Next: berteam report run" in berteam("inspect", "run").stdout
+    assert "Next: berteam evaluate run" in berteam("resume", "run", "epochs=4").stdout
+    berteam("report", "run")
+    page = (tmp_path / "run" / "report" / "report.html").read_text()
+    assert "looked at this run after epoch 2; it has gone on since" in page
+    assert "Regression" not in page
+    berteam("evaluate", "run")
+    berteam("report", "run", "on_exists=overwrite")
+    assert "it has gone on since" not in (tmp_path / "run" / "report" / "report.html").read_text()

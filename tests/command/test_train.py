@@ -296,6 +296,9 @@ def test_a_run_killed_in_the_middle_of_rows_is_read(berteam, tmp_path):
         (tmp_path / "run" / f"{name}.csv").unlink()
     for command in ("inspect", "report", "evaluate"):
         berteam(command, "run")
+    said = berteam("inspect", "run").stdout
+    assert "run: broken off, started" in said
+    assert "Next: berteam resume run" in said
     manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"status": "done"}))
     assert "is cut off in the middle of line" in berteam("inspect", "run", code=2).stderr
 
