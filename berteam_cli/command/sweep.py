@@ -17,7 +17,7 @@ from berteam_cli.sweep.folder import LOCKS, TABLE, Sweep, working
 from berteam_cli.sweep.job import STOP
 from berteam_cli.sweep.search import check_search, ends
 
-Check = Callable[[str, list[str]], None]
+Check = Callable[[str, list[str]], object]
 """Checks the words of a command as Hydra would compose them; raises InputError."""
 Launch = Callable[[str, list[str]], None]
 """Runs a multirun of a command with these words."""
