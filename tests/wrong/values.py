@@ -84,7 +84,7 @@ def out_of_bounds(every: list[Known], rng: random.Random) -> Iterator[Wrong]:
             if key not in x.whole:
                 wrong += ["nan", "inf", "-inf", "1e400", "-1e400", str(low) if open_low else str(low - 0.5)]
             value = rng.choice(wrong)
-            limit = "" if high == LIMIT or value == "nan" else "and <="
+            limit = "" if high == LIMIT or value == "nan" else "(and <=|from .* to )"
             yield Wrong("bounds", (x.command, *x.first, f"{key}={value}"), rf"{at(key)}.*(must be .*{limit}|nan|large)")
 
 
