@@ -113,11 +113,6 @@ def sync(folder: Path) -> None:
             os.close(opened)
 
 
-def any_in(folder: Path) -> bool:
-    """Returns whether there is a checkpoint under ``folder``, whole or not."""
-    return any((folder / "checkpoint").glob("epoch_*"))
-
-
 def load(folder: Path, parts: Parts) -> Saved:
     """Returns the newest checkpoint under ``folder`` that is whole.
 

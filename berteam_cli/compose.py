@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -266,19 +265,13 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
     """
     first = re.split("[/@]", group, maxsplit=1)[0]
     # Asking Hydra for the choices of a group takes a tenth of a second, which most keys need not cost.
-    if first == "schema" or not (searched or first in all_groups()):
+    if first == "schema" or not (searched or first in {*groups(), "hydra"}):
         return []
     loader = GlobalHydra.instance().config_loader()
     try:
         return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
     except OSError:  # no file can have that name
         return []
-
-
-@functools.cache
-def all_groups() -> list[str]:
-    """Returns the config groups of the package and of Hydra."""
-    return sorted(GlobalHydra.instance().config_loader().list_groups(""))
 
 
 def check_keys(command: str, searched: list[str], overrides: list[Override]) -> None:

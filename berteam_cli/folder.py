@@ -94,7 +94,16 @@ def write_text(path: Path, text: str) -> None:
 
 def newest(folder: Path) -> int:
     """Returns the epoch of the newest checkpoint in the run's ``folder``, whole or not; -1 if there is none."""
-    return max((int(path.name.removeprefix("epoch_")) for path in (folder / "checkpoint").glob("epoch_*")), default=-1)
+    numbers = (path.name.removeprefix("epoch_") for path in (folder / "checkpoint").glob("epoch_*"))
+    return max((int(number) for number in numbers if number.isdecimal()), default=-1)
+
+
+def evaluated_at(folder: Path) -> int:
+    """Returns the epoch after which the run in ``folder`` was evaluated; -1 if it was not."""
+    try:
+        return int(read_manifest(folder / EVALUATION).get("epoch", -1))
+    except (InputError, ValueError, TypeError, OverflowError):
+        return -1
 
 
 def missing(folder: Path) -> list[Path]:
@@ -161,7 +170,7 @@ class Manifest:
         def go_on() -> str:
             if again:
                 return again
-            if resumable and any((self.folder / "checkpoint").glob("epoch_*")):
+            if resumable and newest(self.folder) >= 0:
                 return f"Go on with: berteam resume {self.folder}"
             return "Begin anew with on_exists=overwrite."
 

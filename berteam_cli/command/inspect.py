@@ -14,9 +14,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from berteam_cli.errors import InputError, shown
-from berteam_cli.folder import MANIFEST, newest, read_manifest
+from berteam_cli.folder import evaluated_at, newest, read_manifest
 from berteam_cli.holding import in_use
-from berteam_cli.records import COLUMNS, EVALUATION
+from berteam_cli.records import COLUMNS
 from berteam_cli.terminal import berteam, console, end, say
 from berteam_cli.trust import told
 
@@ -164,8 +164,7 @@ def next_commands(folder: Path, status: str) -> list[str]:
     """Returns what to do next with a folder of that ``status``."""
     epoch = newest(folder)
     if status == "done":
-        seen = (folder / EVALUATION / MANIFEST).exists() and read_manifest(folder / EVALUATION).get("epoch") == epoch
-        return [berteam("report" if seen or epoch < 0 else "evaluate", [folder])]
+        return [berteam("report" if epoch in {-1, evaluated_at(folder)} else "evaluate", [folder])]
     return [berteam("inspect" if epoch < 0 or in_use(folder) else "resume", [folder])]
 
 

@@ -19,7 +19,7 @@ from berteam_cli.compose import config_of
 from berteam_cli.config_commands import ReproduceConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.paper import Reproduced, rows
-from berteam_cli.folder import CONFIG, MANIFEST, read_manifest
+from berteam_cli.folder import CONFIG, MANIFEST, newest, read_manifest
 from berteam_cli.quiet import written
 from berteam_cli.records import COLUMNS, EVALUATION, write_table
 from berteam_cli.report.drawing import check_matplotlib
@@ -142,7 +142,7 @@ class Work:
         optimizer, selector = algorithm
         place = self.folder / "train" / f"{optimizer}_{selector}_seed{seed}"
         if not done(place):
-            there = any(place.glob("checkpoint/epoch_*"))
+            there = newest(place) >= 0
             words = [
                 *(f"experiment={self.config.what}", f"selector={selector}", f"optimizer={optimizer}", f"seed={seed}"),
                 *(f"epochs={self.scaled(self.experiment.epochs, 2)}", f"workers={self.config.workers}"),

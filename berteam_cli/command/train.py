@@ -16,7 +16,7 @@ from berteam_cli.config_commands import TrainConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.evaluation.exploiting import Exploiting
-from berteam_cli.folder import Manifest, claim, logging_to, new_folder
+from berteam_cli.folder import Manifest, claim, logging_to, new_folder, newest
 from berteam_cli.holding import held
 from berteam_cli.live import View, shown
 from berteam_cli.logger.base import Once
@@ -93,7 +93,7 @@ def resumed(config: TrainConfig, text: str, folder: Path, parts: Parts) -> Saved
         return None
     checkpoint.check_schema(folder)
     check_same(folder, text)
-    if not checkpoint.any_in(folder):
+    if newest(folder) < 0:
         return None
     saved = checkpoint.load(folder, parts)
     done = saved.run.epoch

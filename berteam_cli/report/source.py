@@ -10,8 +10,7 @@ from typing import Any
 import pandas as pd
 
 from berteam_cli.command.inspect import read_table
-from berteam_cli.errors import InputError
-from berteam_cli.folder import CONFIG, newest, read_manifest
+from berteam_cli.folder import CONFIG, evaluated_at, newest, read_manifest
 from berteam_cli.records import COLUMNS, EVALUATION
 
 STATUS = {
@@ -57,19 +56,16 @@ class Source:
         said = [STATUS[self.manifest["status"]]] if self.manifest["status"] in STATUS else []
         if self.outdated:
             said.append(
-                f"`berteam evaluate` looked at this run after epoch {self.outdated}; it has gone on since, so what was "
-                "found is left out. Evaluate it anew."
+                f"`berteam evaluate` looked at this run after epoch {evaluated_at(self.folder)}; it has gone on since, "
+                "so what was found is left out. Evaluate it anew."
             )
         return " ".join(said) or None
 
     @cached_property
-    def outdated(self) -> int:
-        """The epoch after which the run was evaluated, if it has gone on since; else 0."""
-        try:
-            evaluated = read_manifest(self.folder / EVALUATION).get("epoch", 0)
-        except InputError:
-            return 0
-        return int(evaluated) if evaluated != newest(self.folder) else 0
+    def outdated(self) -> bool:
+        """Whether the run has gone on since it was evaluated, as far as its checkpoints tell."""
+        seen, now = evaluated_at(self.folder), newest(self.folder)
+        return seen != now and -1 not in {seen, now}
 
     def table(self, name: str) -> pd.DataFrame | None:
         """Returns a table of the run, None where there is none or it is empty.

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import sys
 
 import pytest
@@ -157,3 +158,9 @@ def test_an_evaluation_of_an_earlier_epoch_is_left_out(berteam, tmp_path):
     berteam("evaluate", "run")
     berteam("report", "run", "on_exists=overwrite")
     assert "it has gone on since" not in (tmp_path / "run" / "report" / "report.html").read_text()
+    # Without checkpoints, which may be removed to save room, nothing says that it went on; other folders are none.
+    shutil.rmtree(tmp_path / "run" / "checkpoint")
+    (tmp_path / "run" / "checkpoint" / "epoch_odd").mkdir(parents=True)
+    berteam("report", "run", "on_exists=overwrite")
+    assert "it has gone on since" not in (tmp_path / "run" / "report" / "report.html").read_text()
+    assert "Next: berteam report run" in berteam("inspect", "run").stdout
