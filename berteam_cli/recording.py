@@ -72,8 +72,11 @@ class Recorder:
         self.tables.add("selector", [(run.epoch, *figures, selecting.skipped)])
         clock.lap("record_s")
         sight = self.watched(run)
-        clock.lap("evaluate_s")
-        seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
+        if sight is not None:
+            clock.lap("evaluate_s")
+        seconds = (
+            {"evaluate_s": 0.0} | report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
+        )
         self.tables.add("timing", [tuple(seconds[column] for column in COLUMNS["timing"])])
         return {"effective_teams": effective, "entropy": entropy, "exploitability": exploited}, distribution, sight
 
