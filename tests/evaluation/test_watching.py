@@ -154,15 +154,15 @@ def test_the_best_member_is_the_fittest_that_learns(parts):
 
 
 def test_a_look_is_the_same_whoever_takes_it_and_changes_nothing(parts):
-    run = begin(parts)
-    before = {name: x.clone() for name, x in parts.optimizer.islands[0].learner.tensors(run.population.minds[0]).items()}
+    run, learner = begin(parts), parts.optimizer.islands[0].learner
+    before = {name: x.clone() for name, x in learner.tensors(run.population.minds[0]).items()}
     reference = Reference(unordered_teams(3, 2), np.full(6, 1000.0), "")
     looks = [Watching(parts, every, 4, reference).look(run) for every in (1, 5)]
     assert list(map(str, looks[0].rows())) == list(map(str, looks[1].rows()))
     assert looks[0].of(CHOICE).results.sum() == 4 * 6 * 2
     other = Watching(parts, 1, 4, reference).look(replace(run, epoch=1))
     assert other.of(CHOICE).members != looks[0].of(CHOICE).members
-    after = parts.optimizer.islands[0].learner.tensors(run.population.minds[0])
+    after = learner.tensors(run.population.minds[0])
     assert all((before[name] == after[name]).all() for name in before)
 
 
