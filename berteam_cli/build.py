@@ -114,6 +114,7 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
         raise InputError(
             f"team_size must be at most {members}, the members of the population, but is {config.team_size}."
         )
+    check_watched(config.evaluate_every, playing.env)
     improving = optimizer(config, islands, playing)
     selecting = selector(config, field_of(config, islands, playing.env), playing.env, device)
     if selecting.answers and config.games_per_epoch % 2:
@@ -134,6 +135,19 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
         optimizer=improving,
         room=blank_trajectories(playing.env, games_kept) if games_kept else None,
     )
+
+
+def check_watched(every: int, game: Env) -> None:
+    """Checks that there is somebody to play against in looks at a run, one ``every`` so many epochs, 0: never.
+
+    Raises:
+        InputError: there is not.
+    """
+    if every and not game.standard_policies:
+        raise InputError(
+            f"evaluate_every must be 0 with env={game.name}, which has no fixed policies to play against, "
+            f"but is {every}."
+        )
 
 
 def parts_to_read(config: TrainConfig) -> Parts:

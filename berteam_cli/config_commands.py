@@ -44,6 +44,8 @@ class TrainConfig(CommandConfig):
     record_every: int = number(1)
     payoff_steps: int = number()
     checkpoint_every: int = number(1)
+    evaluate_every: int = number()
+    evaluate_teams: int = number(1, 1000)
     selector: SelectorConfig = MISSING
     optimizer: OptimizerConfig = MISSING
     population: PopulationConfig = MISSING

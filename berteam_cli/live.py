@@ -13,6 +13,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from berteam_cli.evaluation.sight import Sight
 from berteam_cli.optimizer.fitness import CaptainElo
 from berteam_cli.pace import Pace, spoken
 from berteam_cli.population import names
@@ -37,11 +38,16 @@ class View:
         self.parts, self.epochs, self.pace = parts, epochs, pace
         self.run, self.replaced = run, 0
         self.recorded: tuple[int, TeamDistribution] | None = None
+        self.sight: Sight | None = None
 
-    def tell(self, run: Run, replaced: int, distribution: TeamDistribution | None) -> None:
-        """Takes the run after an epoch, the members it replaced, and its distribution if that was recorded."""
+    def tell(self, run: Run, replaced: int, distribution: TeamDistribution | None, sight: Sight | None = None) -> None:
+        """Takes the run after an epoch and the members it replaced; its distribution if that was recorded.
+
+        And what was seen of it against the fixed teams, if it was looked at.
+        """
         self.run = run
         self.replaced += replaced
+        self.sight = sight or self.sight
         if distribution is not None:
             self.recorded = run.epoch, distribution
 
@@ -97,6 +103,8 @@ class View:
         for first in range(0, len(cells), beside):
             grid.add_row(*cells[first : first + beside])
         yield grid
+        if self.sight is not None:
+            yield f"[dim]against the fixed teams:[/dim] {self.sight.spoken()}"
 
 
 def rate(value: float) -> str:

@@ -10,20 +10,23 @@ from typing import Any
 import numpy as np
 
 from berteam_cli.evaluation.exploiting import Exploiting
+from berteam_cli.evaluation.sight import Sight
+from berteam_cli.evaluation.watching import Watching
 from berteam_cli.learner.base import LEARNING_FIGURES
 from berteam_cli.outcomes import SIDES, Outcomes
 from berteam_cli.population import island_of, names
-from berteam_cli.records import BY_SIDE_TABLE, COLUMNS, SIDES_TABLE, Tables, team_name, team_names
+from berteam_cli.records import BY_SIDE_TABLE, COLUMNS, SIDES_TABLE, WATCHED_TABLE, Tables, team_name, team_names
 from berteam_cli.selector.base import TeamDistribution, measured
 from berteam_cli.training import RECORDS, Clock, Parts, Report, Run, generator
 
 Row = tuple[Any, ...]
 
 
-def also_growing(parts: Parts) -> list[str]:
-    """Returns the tables that only runs of such ``parts`` have."""
+def also_growing(parts: Parts, *, watched: bool) -> list[str]:
+    """Returns the tables that only runs of such ``parts`` have, or such as are ``watched`` while they go on."""
     several, apart = parts.games.env.sides > 2, parts.selector.by_side
-    return [name for name, there in ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart)) if there]
+    asked = ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart), (WATCHED_TABLE, watched))
+    return [name for name, there in asked if there]
 
 
 @dataclass(frozen=True)
@@ -35,18 +38,21 @@ class Recorder:
         parts: of the run.
         every: epochs between two records of members and distributions.
         exploiting: measures how exploitable a distribution is.
+        watching: looks at how the run fares against fixed teams; None: nobody does.
     """
 
     tables: Tables
     parts: Parts
     every: int
     exploiting: Exploiting
+    watching: Watching | None = None
 
-    def epoch(self, run: Run, report: Report) -> tuple[dict[str, float], TeamDistribution | None]:
+    def epoch(self, run: Run, report: Report) -> tuple[dict[str, float], TeamDistribution | None, Sight | None]:
         """Records an epoch, and after every ``every``-th one the state it led to.
 
         Returns:
-            The figures of that state, NaN where it was not recorded, and its distribution over teams.
+            The figures of that state, NaN where it was not recorded, its distribution over teams, and what was seen of
+            it against fixed teams, if it was looked at.
         """
         clock = Clock()
         selecting = report.selecting
@@ -65,19 +71,33 @@ class Recorder:
         figures = (selecting.loss, selecting.updates, selecting.buffer, effective, entropy, exploited)
         self.tables.add("selector", [(run.epoch, *figures, selecting.skipped)])
         clock.lap("record_s")
-        seconds = report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
+        sight = self.watched(run)
+        if sight is not None:
+            clock.lap("evaluate_s")
+        seconds = (
+            {"evaluate_s": 0.0} | report.seconds | clock.laps | {"epoch": run.epoch, "env_steps": report.env_steps}
+        )
         self.tables.add("timing", [tuple(seconds[column] for column in COLUMNS["timing"])])
-        return {"effective_teams": effective, "entropy": entropy, "exploitability": exploited}, distribution
+        return {"effective_teams": effective, "entropy": entropy, "exploitability": exploited}, distribution, sight
+
+    def watched(self, run: Run, *, last: bool = False) -> Sight | None:
+        """Looks at the run, if that is due, and records what is seen; after the ``last`` epoch if it was not due."""
+        if self.watching is None or self.watching.due(run.epoch) == last:
+            return None
+        sight = self.watching.look(run)
+        self.tables.add(WATCHED_TABLE, sight.rows())
+        return sight
 
     def distribution(self, run: Run) -> TeamDistribution:
         """Returns the distribution over teams after ``run.epoch`` epochs."""
         rng = generator(self.parts.seed, RECORDS, run.epoch)
         return measured(self.parts.selector, run.selection, rng)
 
-    def last(self, run: Run) -> None:
-        """Records the state after the last epoch, unless that is done."""
+    def last(self, run: Run) -> Sight | None:
+        """Records the state after the last epoch and what is seen of it, unless that is done; returns what is seen."""
         if run.epoch % self.every:
             self.state(run)
+        return self.watched(run, last=True)
 
     def state(self, run: Run) -> TeamDistribution:
         """Records the members and the distributions over teams, captains and islands; returns that over teams."""

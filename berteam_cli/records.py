@@ -43,6 +43,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "selector": ("epoch", "loss", "updates", "buffer", "effective_teams", "entropy", "exploitability", "skipped"),
     "timing": (
         *("epoch", "select_s", "play_s", "learn_s", "renew_s", "selector_s", "record_s", "env_steps", "probe_s"),
+        "evaluate_s",
     ),
     "summary": (
         *("expected_elo", "expected_elo_low", "expected_elo_high", "best_team", "best_elo"),
@@ -88,6 +89,11 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "calibration": ("epoch", "decile", "teams", "predicted_elo", "elo", "low", "high"),
     "embeddings": ("epoch", "group", "members", "pairs", "cosine", "above_all"),
     "neighbours": ("epoch", "agent", "name", "rank", "neighbour", "neighbour_name", "cosine"),
+    "evaluation": (
+        *("epoch", "who", "opponent", "games", "wins", "draws", "losses"),
+        *("captures", "grabs", "tags", "wall_hits", "opponent_captures", "opponent_grabs", "opponent_tags", "steps"),
+        *("elo", "elo_low", "elo_high", "members"),
+    ),
 }
 GROWING = (
     *("agents", "team_distribution", "captain_distribution", "island_distribution"),
@@ -96,6 +102,7 @@ GROWING = (
 """Tables that get rows in every epoch, or in every recorded one."""
 SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row in "games" has no room for all
 BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
+WATCHED_TABLE = "evaluation"  # grows too, where the run is looked at while it goes on (evaluate_every)
 EVALUATION = "evaluation"
 """The folder in a run's, where `berteam evaluate` writes."""
 SHEETS = ("played", "members", "replayed", "payoffs", "encounters")

@@ -18,7 +18,7 @@ from berteam_cli.outcomes import Ints, Outcomes
 from berteam_cli.population import Population, founded, policies
 from berteam_cli.selector.base import Answering, Selecting, Selector
 
-FOUNDING, EPOCHS, RECORDS, EVALUATION, PAYOFFS = range(5)  # what a stream of random numbers is for
+FOUNDING, EPOCHS, RECORDS, EVALUATION, PAYOFFS, WATCHED = range(6)  # what a stream of random numbers is for
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from berteam_cli.trust import told
 WHOLE = {"team": str, "blue": str, "red": str, "best_team": str, "opponent": str}  # 3 is a team, not a number
 TEXT = {
     *(*WHOLE, "members", "name", "island", "algorithm", "side", "reason", "cycle", "decision", "run", "quantity"),
-    *("source", "choice", "kind", "group", "neighbour_name"),
+    *("source", "choice", "kind", "group", "neighbour_name", "who"),
 }
 """Columns of words; all others are numbers."""
 

@@ -16,11 +16,13 @@ from berteam_cli.config_commands import TrainConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.ending import END_TABLES, conclude
 from berteam_cli.evaluation.exploiting import Exploiting
+from berteam_cli.evaluation.reference import reference
+from berteam_cli.evaluation.watching import Watching
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder, newest
 from berteam_cli.holding import held
 from berteam_cli.live import View, shown
 from berteam_cli.logger.base import Once
-from berteam_cli.logger.opening import check_logger, figures_of, logger
+from berteam_cli.logger.opening import check_logger, figures_of, logger, seen
 from berteam_cli.memory import spoken, state_bytes
 from berteam_cli.pace import Pace
 from berteam_cli.recording import Recorder, also_growing
@@ -106,8 +108,10 @@ def trained(
     config: TrainConfig, folder: Path, parts: Parts, saved: Saved | None, started: float, stop: Stop, also: Once
 ) -> tuple[Run, Recorder]:
     """Runs the epochs; returns the run after the last one, and what recorded it."""
-    tables = Tables(folder, saved.table_sizes if saved else None, also_growing(parts))
-    recorder = Recorder(tables, parts, config.record_every, Exploiting(parts, config.payoff_steps))
+    watching = watched(config, parts)
+    sizes = saved.table_sizes if saved else None
+    tables = Tables(folder, sizes, also_growing(parts, watched=watching is not None))
+    recorder = Recorder(tables, parts, config.record_every, Exploiting(parts, config.payoff_steps), watching)
     seconds = saved.seconds if saved else 0.0
     run = saved.run if saved else begin(parts)
 
@@ -117,21 +121,22 @@ def trained(
 
     for name in END_TABLES:
         (folder / f"{name}.csv").unlink(missing_ok=True)  # of an earlier end of this run
-    distribution = None
+    distribution, sight = None, None
     if saved is None:
-        distribution = recorder.state(run)
+        distribution, sight = recorder.state(run), recorder.watched(run)
+        also(run.epoch, seen(sight))
         keep()
     pace = Pace(run.epoch, config.epochs)
     view = View(parts, config.epochs, pace, run)
-    view.tell(run, tables.rows("generations"), distribution)
+    view.tell(run, tables.rows("generations"), distribution, sight)
     with shown(view):
         while run.epoch < config.epochs:
             stop.in_epoch = True
             run, report = epoch(run, parts)
-            state, distribution = recorder.epoch(run, report)
-            also(run.epoch, figures_of(run, report, parts, state))
+            state, distribution, sight = recorder.epoch(run, report)
+            also(run.epoch, figures_of(run, report, parts, state, sight))
             pace.tell(run.epoch, config.games_per_epoch)
-            view.tell(run, len(report.replaced), distribution)
+            view.tell(run, len(report.replaced), distribution, sight)
             asked = stop.asked  # later than this it ends after the next epoch
             if asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
                 keep()
@@ -139,6 +144,17 @@ def trained(
             if asked:
                 tables.close()
                 raise KeyboardInterrupt
-    recorder.last(run)
+    also(run.epoch, seen(recorder.last(run)))
     tables.close()
     return run, recorder
+
+
+def watched(config: TrainConfig, parts: Parts) -> Watching | None:
+    """Returns how the run is looked at while it goes on, None where it is not.
+
+    Where the Elos of the fixed teams are not shipped, they play for them now.
+    """
+    if not config.evaluate_every:
+        return None
+    opponents = reference(parts.games, config.evaluation.reference_teams)
+    return Watching(parts, config.evaluate_every, config.evaluate_teams, opponents)

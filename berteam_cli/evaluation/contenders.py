@@ -17,7 +17,10 @@ from berteam_cli.reading import last_state
 from berteam_cli.stored import flat, plain_config
 from berteam_cli.training import Parts, Run
 
-ASIDE = ("seed", "out", "on_exists", "workers", "device", "logger", "checkpoint_every", "record_every", "payoff_steps")
+ASIDE = (
+    *("seed", "out", "on_exists", "workers", "device", "logger", "checkpoint_every", "record_every", "payoff_steps"),
+    *("evaluate_every", "evaluate_teams"),
+)
 """Keys that do not make another algorithm, beside all of ``evaluation``."""
 FIRST = ("selector", "optimizer", "population", "learner", "env")  # groups, in the order in which they are told
 

@@ -99,7 +99,8 @@ def rate(
     if len(chosen) == 0:
         nobody = Truth(chosen, np.zeros(0), np.zeros(0), independent(*np.zeros((3, 0, 0), dtype=np.int64)))
         return nobody, "none: no team was rated"
-    known: Reference = reference(parts.games, settings.reference_teams)
+    watching = recorder.watching  # which knows them already
+    known: Reference = watching.reference if watching else reference(parts.games, settings.reference_teams)
     members = policies(parts.optimizer.islands, run.population, explore=False)
     return truth(parts.games, members, chosen, known, settings.games_per_pair, rng), known.source
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from berteam_cli.config_groups import LoggerConfig
 from berteam_cli.errors import InputError
+from berteam_cli.evaluation.sight import Sight
 from berteam_cli.logger.base import Logger, Once
 from berteam_cli.logger.csv import Nowhere
 from berteam_cli.training import Parts, Report, Run
@@ -67,7 +68,9 @@ def logger(config: LoggerConfig, folder: Path, manifest: Mapping[str, Any], told
         opened.close()
 
 
-def figures_of(run: Run, report: Report, parts: Parts, state: Mapping[str, float]) -> dict[str, float]:
+def figures_of(
+    run: Run, report: Report, parts: Parts, state: Mapping[str, float], sight: Sight | None = None
+) -> dict[str, float]:
     """Returns the figures of an epoch under the names that loggers show; NaN where there is none.
 
     Args:
@@ -75,6 +78,7 @@ def figures_of(run: Run, report: Report, parts: Parts, state: Mapping[str, float
         report: of the epoch.
         parts: of the run.
         state: of the selector after it: effective_teams, entropy, exploitability.
+        sight: what was seen of it against fixed teams; None where it was not looked at.
     """
     seconds, games = report.seconds, len(report.outcomes.lineups)
     figures = {f"timing/{name}": value for name, value in seconds.items()}
@@ -100,4 +104,9 @@ def figures_of(run: Run, report: Report, parts: Parts, state: Mapping[str, float
         for name in ("loss", "entropy"):
             known = [value for x in learnt if not math.isnan(value := getattr(x, name))]
             figures[f"learning/{algorithm}_{name}"] = float(np.mean(known)) if known else math.nan
-    return figures
+    return figures | seen(sight)
+
+
+def seen(sight: Sight | None) -> dict[str, float]:
+    """Returns the figures of a look at the run, none where there was no look."""
+    return {} if sight is None else sight.figures()

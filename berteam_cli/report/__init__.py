@@ -1,5 +1,5 @@
 """A run as one page to read: source.py reads it, the plots draw it, page.py puts it together.
 
-drawing.py tells how a plot looks, in light and dark; chosen.py, strength.py, members.py and course.py draw one kind of
-plot each; film.py brings the replay; overview.py the tables of several runs.
+drawing.py tells how a plot looks, in light and dark; chosen.py, strength.py, members.py, watched.py and course.py draw
+one kind of plot each; film.py brings the replay; overview.py the tables of several runs.
 """

@@ -27,6 +27,7 @@ PARTS = {
     "probe_s": "probing",
     "select_s": "choosing teams",
     "renew_s": "replacing",
+    "evaluate_s": "looking",
 }
 
 
@@ -90,22 +91,23 @@ def timing(source: Source) -> Plot:
     table = source.table("timing")
     if table is None:
         return Plot(name, title, "There is nothing in timing.csv yet: berteam train writes it.")
-    x, y = binned(table.epoch.to_numpy(), table[list(PARTS)].fillna(0).to_numpy(float), 200)
+    parts = {part: said for part, said in PARTS.items() if table[part].any()}
+    x, y = binned(table.epoch.to_numpy(), table[list(parts)].fillna(0).to_numpy(float), 200)
     figure, (plot,) = panels()
     if len(x) > 1:
-        whole = max(table[list(PARTS)].sum().sum(), 1e-12)
-        labels = [f"{said} ({table[part].sum() / whole:.0%})" for part, said in PARTS.items()]
-        plot.stackplot(x, y.T, labels=labels, colors=SERIES[: len(PARTS)])
+        whole = max(table[list(parts)].sum().sum(), 1e-12)
+        labels = [f"{said} ({table[part].sum() / whole:.0%})" for part, said in parts.items()]
+        plot.stackplot(x, y.T, labels=labels, colors=SERIES[: len(parts)])
         plot.set_xlim(x[0], x[-1])
         over_epochs(plot)
     else:
-        plot.bar(list(PARTS.values()), y[0], color=SERIES[0])
+        plot.bar(list(parts.values()), y[0], color=SERIES[0])
         plot.tick_params(axis="x", rotation=30)
     plot.set_ylabel("seconds an epoch")
     highest = float(y[len(y) > 2 :].sum(axis=1).max())
     plot.set_ylim(0, 1.1 * highest if highest > 0 else None)
     figure.legend(loc="outside lower left", ncols=3)
-    total = table[list(PARTS)].sum(axis=1)
+    total = table[list(parts)].sum(axis=1)
     says = (
         f"{total.sum():,.0f} s in all, {total.median():.3g} s in the median epoch; the first, in which kernels are "
         "loaded, may be cut off. Seconds depend on the machine and on who else used it; the evaluation at the end is "
