@@ -51,7 +51,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
         "wandb": config_groups.WandbConfig,
         "mlflow": config_groups.MlflowConfig,
     },
-    "curriculum": {"starts": config_groups.CurriculumConfig},
+    "curriculum": {"none": config_groups.CurriculumConfig, "starts": config_groups.CurriculumConfig},
     "command": {
         "train": config_commands.TrainConfig,
         "tournament": config_commands.TournamentConfig,
