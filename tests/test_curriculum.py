@@ -1,9 +1,11 @@
 """The training loop practises; whatever measures does not."""
 
 import numpy as np
+import pytest
 
 from berteam_cli import build
 from berteam_cli.config import checked
+from berteam_cli.errors import InputError
 from berteam_cli.training import Probes, begin, epoch
 from tests.test_config import composed
 
@@ -39,3 +41,22 @@ def test_when_the_shares_are_gone_training_is_as_without():
 def test_by_default_nobody_practises():
     assert parts().curriculum.total == 0
     assert parts("curriculum=starts").curriculum.total == 0.6
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("env.last_steps=0", "env.last_steps must be >= 1 and <= 16, but is 0"),
+        ("env.last_steps=17", "env.last_steps must be >= 1 and <= 16, but is 17"),
+        ("env.potential=-1", "env.potential must be >= 0, but is -1"),
+        ("env.potential_discount=1.1", "env.potential_discount must be >= 0 and <= 1, but is 1.1"),
+        ("env.potential_tagged=-2", "env.potential_tagged must be >= -1 and <= 1, but is -2"),
+        ("env.team_share=2", "env.team_share must be >= 0 and <= 1, but is 2"),
+        ("curriculum.carrying=1.5", "curriculum.carrying must be >= 0 and <= 1, but is 1.5"),
+        ("curriculum.near_flag_m=0", "curriculum.near_flag_m must be > 0, but is 0"),
+        ("curriculum.until=-1", "curriculum.until must be >= 0, but is -1"),
+    ],
+)
+def test_wrong_values(word, said):
+    with pytest.raises(InputError, match=said):
+        checked(composed(word))

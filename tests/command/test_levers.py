@@ -1,8 +1,5 @@
 """What helps to learn the game mctf, in the real commands."""
 
-import json
-
-import numpy as np
 import pandas as pd
 import pytest
 from stable_baselines3 import PPO
@@ -31,6 +28,8 @@ def test_the_same_bytes_for_any_workers_and_when_resumed(run, berteam, tmp_path)
     berteam("train", *GAME, *LEVERS, "workers=3", "epochs=2", "out=parts")
     berteam("train", *GAME, *LEVERS, "workers=2", "epochs=4", "out=parts", "on_exists=resume")
     same(tmp_path / "run", tmp_path / "parts")
+    config = (tmp_path / "run" / "config.yaml").read_text()
+    assert all(word in config for word in ("carrying: 0.2", "until: 3", "last_steps: 3", "team_share: 0.25"))
     assert "env.potential_discount" not in (tmp_path / "run" / "log.txt").read_text()
 
 
@@ -40,12 +39,9 @@ def test_a_run_that_sees_three_steps_goes_everywhere(run, berteam, tmp_path):
     berteam("replay", "run", "blue=0-1", "red=2-3")
     few = ["games_per_pair=1", "replay_games=1", "aggression_games=1", "payoff_games=1", "reference_teams=2", "most=0"]
     berteam("evaluate", "run", *few)
-    berteam("tournament", "run=[run,one]", "top=3", "games_per_pair=2", "out=t")
+    berteam("tournament", "run=[one,run]", "top=3", "games_per_pair=2", "out=t")
     assert len(pd.read_csv(tmp_path / "t" / "elo.csv")) == 6
-    for order in (("run", "one"), ("one", "run")):
-        words = ["games=8", "reference_games=8", "reference_teams=2", f"out={order[0]}_first"]
-        berteam("compare", *order, *words)
-    assert len({(tmp_path / f"{x}_first" / "versus.csv").read_bytes() for x in ("run", "one")}) == 1
+    berteam("compare", "run", "one", "games=8", "reference_games=8", "reference_teams=2", "out=c")
     said = berteam("export", "run", "agent=2").stdout
     assert "It sees the observations of the last 3 steps in one, the newest first" in said
     model = PPO.load(tmp_path / "run" / "agent_2.zip")
@@ -55,20 +51,6 @@ def test_a_run_that_sees_three_steps_goes_everywhere(run, berteam, tmp_path):
     berteam("train", *taken, "optimizer=fixed", "env.last_steps=3", "epochs=1", "out=taken")
     refused = berteam("train", *taken, "out=refused", code=2).stderr
     assert "sees 135 numbers and has 17 actions, but in this game observations have 45" in refused.replace("\n", " ")
-
-
-def test_a_run_of_one_step_is_the_same_among_those_of_three(berteam, tmp_path):
-    """Its members against the fixed policies, in a tournament of its own and in one with a wider run."""
-    words = ["selector=uniform", "population=ppo6", *TINY, "evaluation.games=0"]
-    berteam("train", *words, "out=one")
-    berteam("train", *words, "env.last_steps=2", "epochs=0", "out=two")
-    teams = "teams=[0-1,2-3]"
-    berteam("tournament", "run=one", teams, "games_per_pair=8", "out=alone")
-    berteam("tournament", "run=[one,two]", teams, "games_per_pair=8", "out=among")
-    alone, among = (pd.read_csv(tmp_path / x / "games.csv") for x in ("alone", "among"))
-    assert len(alone) == 8
-    for column in ("seed", "blue", "red", "steps", "blue_score"):
-        np.testing.assert_array_equal(alone[column], among[column])
 
 
 def test_another_discount_is_told_of(berteam, tmp_path):
@@ -82,31 +64,11 @@ def test_another_discount_is_told_of(berteam, tmp_path):
         )
 
 
-REFUSED = {
-    "env.last_steps=0": "env.last_steps must be >= 1 and <= 16, but is 0",
-    "env.last_steps=17": "env.last_steps must be >= 1 and <= 16, but is 17",
-    "env.potential=-1": "env.potential must be >= 0, but is -1",
-    "env.potential_discount=1.1": "env.potential_discount must be >= 0 and <= 1, but is 1.1",
-    "env.potential_tagged=-2": "env.potential_tagged must be >= -1 and <= 1, but is -2",
-    "env.team_share=2": "env.team_share must be >= 0 and <= 1, but is 2",
-    "env.reward=outcomes": "Did you mean outcome?",
-    "curriculum=start": "Did you mean starts?",
-    "curriculum.carrying=1.5": "curriculum.carrying must be >= 0 and <= 1, but is 1.5",
-    "curriculum.near_flag_m=0": "curriculum.near_flag_m must be > 0, but is 0",
-    "curriculum.until=-1": "curriculum.until must be >= 0, but is -1",
-}
-
-
-@pytest.mark.parametrize("word", REFUSED)
-def test_wrong_values(word, berteam, tmp_path):
-    said = " ".join(berteam("train", word, "out=run", code=2).stderr.split())
-    assert REFUSED[word] in said
-    assert not (tmp_path / "run").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (["env.reward=outcomes"], "Did you mean outcome?"),
+        (["curriculum=start"], "Did you mean starts?"),
         (["curriculum=starts", "curriculum.random=0.7"], "random, near_flag and carrying must be at most 1 together"),
         (["curriculum=starts", "env=rps", "population=ppo6"], "curriculum must be none with env=rps, as only games of"),
     ],
@@ -114,11 +76,3 @@ def test_wrong_values(word, berteam, tmp_path):
 def test_what_does_not_go_together(words, said, berteam, tmp_path):
     assert said in " ".join(berteam("train", *words, "out=run", code=2).stderr.split())
     assert not (tmp_path / "run").exists()
-
-
-def test_the_config_says_what_was_played(run, tmp_path):
-    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
-    assert manifest["status"] == "done"
-    config = (tmp_path / "run" / "config.yaml").read_text()
-    assert "carrying: 0.2" in config
-    assert "last_steps: 3" in config

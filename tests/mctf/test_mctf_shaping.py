@@ -198,9 +198,11 @@ def test_the_order_of_policies_stays(sequences, discount):
     assert 3 <= decided.sum() <= 21
     assert shaped[decided] - plain[decided] == pytest.approx(-2.5 * start[decided], abs=1e-9)
     assert shaped[~decided] - plain[~decided] == pytest.approx(-2.5 * (start - last)[~decided], abs=1e-9)
-    assert np.abs(last[~decided]).max() > 1e-4
+    assert np.abs(last[~decided]).max() > 1e-7
     for v in range(4):
-        assert np.argsort(shaped[decided, v], kind="stable").tolist() == np.argsort(plain[decided, v]).tolist()
+        order = np.argsort(plain[decided, v])
+        assert (np.diff(shaped[decided, v][order]) > -1e-9).all()
+        assert np.ptp(plain[decided, v]) > 1e-3
 
 
 def test_another_discount_does_not_cancel(sequences):
