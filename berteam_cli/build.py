@@ -12,7 +12,8 @@ import torch
 
 from berteam_cli.cluster import Cluster
 from berteam_cli.config_commands import RAY, CommandConfig, TrainConfig
-from berteam_cli.config_groups import EnvConfig, OptimizerConfig
+from berteam_cli.config_groups import CurriculumConfig, EnvConfig, OptimizerConfig
+from berteam_cli.curriculum import Curriculum, Practising
 from berteam_cli.env.base import Env, blank_trajectories
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.pettingzoo import Pettingzoo
@@ -42,6 +43,7 @@ from berteam_cli.selector.uniform import Uniform
 from berteam_cli.training import Parts, rounds
 from berteam_cli.trust import imported
 from berteam_cli.workers import Workers, available_cores
+from mctf.practice import Starts
 
 ENVS: dict[str, Callable[..., Env]] = {"mctf": Mctf, "rps": Rps, "pettingzoo": Pettingzoo}
 SELECTORS: dict[str, Callable[..., Selector[Any]]] = {
@@ -134,6 +136,7 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
         selector=selecting,
         optimizer=improving,
         room=blank_trajectories(playing.env, games_kept) if games_kept else None,
+        curriculum=curriculum(config.curriculum, playing.env),
     )
 
 
@@ -153,6 +156,25 @@ def check_watched(every: int, game: Env) -> None:
 def parts_to_read(config: TrainConfig) -> Parts:
     """Returns the parts of a run that is only looked at: on the processor, wherever its members learnt."""
     return parts(replace(config, device="cpu"), stored=True, read_only=True)
+
+
+def curriculum(config: CurriculumConfig, game: Env) -> Curriculum:
+    """Returns how training games start.
+
+    Raises:
+        InputError: the shares are more than all games, or the game has one kind of start.
+    """
+    settings = asdict(config)
+    until = settings.pop("until")
+    try:
+        made = Curriculum(Starts(**settings), until)
+    except ValueError as error:
+        raise InputError(f"curriculum: {error}.") from error
+    if made.total > 0 and not isinstance(game, Practising):
+        raise InputError(
+            f"curriculum must be none with env={game.name}, as only games of env=mctf can start elsewhere."
+        )
+    return made
 
 
 def chosen_device(name: str) -> str:

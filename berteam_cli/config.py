@@ -51,6 +51,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
         "wandb": config_groups.WandbConfig,
         "mlflow": config_groups.MlflowConfig,
     },
+    "curriculum": {"none": config_groups.CurriculumConfig, "starts": config_groups.CurriculumConfig},
     "command": {
         "train": config_commands.TrainConfig,
         "tournament": config_commands.TournamentConfig,

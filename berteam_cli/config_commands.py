@@ -9,6 +9,7 @@ from omegaconf import MISSING
 
 from berteam_cli.bounds import choice, number, number_or
 from berteam_cli.config_groups import (
+    CurriculumConfig,
     EnvConfig,
     EvaluationConfig,
     LearnerConfig,
@@ -52,6 +53,7 @@ class TrainConfig(CommandConfig):
     learner: LearnerConfig = MISSING
     evaluation: EvaluationConfig = MISSING
     logger: LoggerConfig = MISSING
+    curriculum: CurriculumConfig = MISSING
 
 
 @dataclass

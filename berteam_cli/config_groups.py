@@ -35,6 +35,9 @@ class RewardWeightsConfig:
     tags_carrier: float | None = MISSING
     wall_hit: float | None = MISSING
     nearer_m: float | None = MISSING
+    won: float | None = MISSING
+    lost: float | None = MISSING
+    drawn: float | None = MISSING
 
 
 @dataclass
@@ -86,6 +89,11 @@ class MctfConfig(EnvConfig):
     field_points: str | None = choice("fixed", "scaled")
     field_point_reach_m: float | None = number(open_low=True)
     policy_version: str | None = choice("2024", "repaired", "2025")
+    potential: float = number()
+    potential_discount: float = number(0, 1)
+    potential_tagged: float = number(-1, 1)
+    team_share: float = number(0, 1)
+    last_steps: int = number(1, 16)
 
 
 @dataclass
@@ -358,6 +366,17 @@ class PopulationConfig:
 
     islands: dict[str, IslandConfig] = MISSING
     members: list[MemberConfig] = field(default_factory=list)
+
+
+@dataclass
+class CurriculumConfig:
+    """How training games start; curriculum.py."""
+
+    random: float = number(0, 1)
+    near_flag: float = number(0, 1)
+    carrying: float = number(0, 1)
+    near_flag_m: float = number(open_low=True)
+    until: int = number()
 
 
 @dataclass

@@ -12,6 +12,7 @@ from berteam_cli.acting import Policies, joined
 from berteam_cli.config_commands import TrainConfig
 from berteam_cli.config_groups import IslandConfig, LearnerConfig, MemberConfig
 from berteam_cli.env.base import Env
+from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError
 from berteam_cli.learner.base import Learner
 from berteam_cli.learner.dqn import Dqn
@@ -24,6 +25,7 @@ from berteam_cli.learner.zipped import Unfit
 from berteam_cli.population import Island
 
 MEMBERS = "members"  # the island of members from files
+SB3_GAMMA = 0.99  # of all algorithms of Stable-Baselines3, if it is not given
 NO_NAMES = {"na", "nan", "null", "none", "n-a", "other"}  # pandas reads most of these as nothing
 
 
@@ -173,3 +175,21 @@ def check_settings(settings: dict[str, Any], key: str) -> None:
         raise InputError(f"{key}.minibatch_size must be >= 2 with {key}.normalize_advantage=true, but is 1.")
     if settings.get("gradient_steps") == 0:
         raise InputError(f"{key}.gradient_steps must be >= 1, or -1 for as many as transitions, but is 0.")
+
+
+def discounts(islands: tuple[Island, ...], game: Env) -> list[str]:
+    """Returns a remark for each island whose learner discounts otherwise than the potential in the game's reward."""
+    if not isinstance(game, Mctf) or game.reward.shaping.potential == 0:
+        return []
+    ours, remarks = game.reward.shaping.potential_discount, []
+    for island in islands:
+        learner: Any = island.learner
+        gamma = getattr(learner, "gamma", None)
+        if gamma is None and hasattr(learner, "options"):
+            gamma = learner.options.get("gamma", SB3_GAMMA)
+        if gamma is not None and gamma != ours:
+            remarks.append(
+                f"The potential in the reward changes which policy is best on island {island.name}, as its learner "
+                f"discounts by gamma={gamma:g} and env.potential_discount is {ours:g}."
+            )
+    return remarks

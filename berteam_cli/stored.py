@@ -89,6 +89,7 @@ def stored_config(folder: Path, trust: Collection[str] = ()) -> DictConfig:
         for group in ("env", "selector", "optimizer", "learner", "logger"):
             typed[group] = OmegaConf.structured(SCHEMAS[group][plain[group].name])
         typed.evaluation = OmegaConf.structured(SCHEMAS["evaluation"]["truth"])
+        typed.curriculum = OmegaConf.structured(SCHEMAS["curriculum"]["none"])
         typed.population = OmegaConf.structured(SCHEMAS["population"]["islands"])
         typed.population.islands = {}
         for name, island in plain.population.islands.items():

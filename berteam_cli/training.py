@@ -10,6 +10,7 @@ import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.acting import fixed_policies, joined
+from berteam_cli.curriculum import Curriculum
 from berteam_cli.env.base import Trajectories
 from berteam_cli.games import Games, as_side_0, both_sides
 from berteam_cli.learner.base import Learning
@@ -32,6 +33,7 @@ class Parts:
         selector: who chooses teams.
         optimizer: what makes members better.
         room: where the trajectories of an epoch's games go, the same in every epoch; None where nobody looks.
+        curriculum: how the games start from which members learn.
     """
 
     seed: int
@@ -40,6 +42,7 @@ class Parts:
     selector: Selector[Any]
     optimizer: Optimizer
     room: Trajectories | None
+    curriculum: Curriculum
 
 
 @dataclass(frozen=True)
@@ -94,10 +97,11 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     lineups = selector.select(run.selection, parts.games_per_epoch // rounds(selector), population.age, select)
     clock.lap("select_s")
     acting = policies(optimizer.islands, population, explore=True)
-    outcomes, experience = parts.games.play(acting, lineups, key(play), record=watched(parts), room=parts.room)
+    games = parts.curriculum.practice(parts.games, run.epoch)
+    outcomes, experience = games.play(acting, lineups, key(play), record=watched(parts), room=parts.room)
     if selector.answers:  # each opponent once more, with teams chosen on what was seen of it
         lineups = cast("Answering[Any]", selector).answer(run.selection, lineups, experience, population.age, select)
-        again = parts.games.play(acting, lineups, key(play), record=True)
+        again = games.play(acting, lineups, key(play), record=True)
         outcomes, experience = outcomes.followed_by(again[0]), experience.followed_by(again[1])
     population = optimizer.rate(population, outcomes)
     clock.lap("play_s")

@@ -53,7 +53,9 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
     runs = contenders([Path(x) for x in config.runs], trusted(config.trust))
     names, of = algorithms(runs)
     seconds = [times(x.folder) for x in runs]
-    games = build.played_by(config.workers, runs[0].parts.games.env)
+    # Networks that see fewer steps than others read the newest ones, which come first.
+    game = max((x.parts.games.env for x in runs), key=lambda env: env.observation_size)
+    games = build.played_by(config.workers, game)
     folder = folder or new_folder("compare")
     if any(folder.resolve() == x.folder.resolve() for x in runs):
         raise InputError(f"out={folder} is one of the runs; choose another folder.")

@@ -214,7 +214,7 @@ def of_runs(config: TournamentConfig, runs: list[Path]) -> Entry:
     """
     tables, teams, called, first = [], [], [], 0
     epochs: list[int] = []
-    game, trust = None, trusted(config.trust)
+    game, widest, trust = None, runs[0], trusted(config.trust)
     for folder in runs:
         if config.out and Path(config.out).resolve() == folder.resolve():
             raise InputError(f"out must be another folder than run, but both are {config.out}.")
@@ -225,6 +225,8 @@ def of_runs(config: TournamentConfig, runs: list[Path]) -> Entry:
             raise InputError(
                 f"run must be of runs with the same game and rules, but {folder} has others than {runs[0]}."
             )
+        if parts.games.env.observation_size > game.env.observation_size:
+            game, widest = parts.games, folder  # networks that see fewer steps read the newest, which come first
         islands = parts.optimizer.islands
         found = parts.selector.likeliest(run.selection, config.top, generator(parts.seed, RECORDS, run.epoch))
         tables.append(policies(islands, run.population, explore=False))
@@ -232,7 +234,7 @@ def of_runs(config: TournamentConfig, runs: list[Path]) -> Entry:
         prefix = f"{folder.name if unique(folder, runs) else folder}/" if len(runs) > 1 else ""
         called += [f"{prefix}{name}" for name in names(islands, run.population)]
         first, epochs = len(called), [*epochs, run.epoch]
-    trained = checked(stored_config(runs[0], trust))
+    trained = checked(stored_config(widest, trust))
     trained.workers = config.workers
     games = build.games(replace(trained, env=started(trained.env, config)))
     if config.fixed:

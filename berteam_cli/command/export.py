@@ -45,8 +45,13 @@ def export(folder: Path, overrides: list[str]) -> Path:
         model = exported(island.learner, run.population.minds[home], agent - island.first, space)
     except ValueError as error:
         raise InputError(f"agent={agent} ({called}) cannot be exported: {error}.") from error
+    steps = parts.games.env.last_steps if isinstance(parts.games.env, Mctf) else 1
+    if steps > 1:
+        model.last_steps = steps  # type: ignore[attr-defined]  # it is saved with the rest, for whoever feeds it
     write_whole(path, model.save)
     say(f"{called} of {folder} after epoch {run.epoch}.")
+    if steps > 1:
+        say(f"It sees the observations of the last {steps} steps in one, the newest first (last_steps in the file).")
     written(path)
     end(path.parent, [path.name], f"in Python: {loading(type(model), path)}")
     return path

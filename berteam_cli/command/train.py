@@ -19,6 +19,7 @@ from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.evaluation.reference import reference
 from berteam_cli.evaluation.watching import Watching
 from berteam_cli.folder import Manifest, claim, logging_to, new_folder, newest
+from berteam_cli.founding import discounts
 from berteam_cli.holding import held
 from berteam_cli.live import View, shown
 from berteam_cli.logger.base import Once
@@ -66,7 +67,7 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
     with logging_to(folder):
         state = sum(state_bytes(island) for island in parts.optimizer.islands)
         played = sum(column.nbytes for column in parts.room or ())
-        for remark in parts.selector.remarks():
+        for remark in (*parts.selector.remarks(), *discounts(parts.optimizer.islands, parts.games.env)):
             log.info("%s", remark)
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
         if saved:

@@ -18,15 +18,19 @@ from berteam_cli.outcomes import Floats, Ints
 from mctf.compiled import kernel, part
 from mctf.draws import next_uniform
 from mctf.geometry import team_of
-from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIME_OUT, finished, step
+from mctf.kernel import RUNNING, TIME_OUT, finished, lead, step
 from mctf.observe import normalise, observe, ranges
+from mctf.practice import BY_THE_RULES, Starts, practise
 from mctf.rewards import TERMS, Reward, make_reward, rewards
 from mctf.rules import ACTIONS, Rules, make_rules
 from mctf.scripted import NAMES as FIXED_POLICIES
 from mctf.scripted import PAPER
 from mctf.scripted import act as act_fixed
+from mctf.shaping import BOUNDS
 from mctf.start import forget, reset
-from mctf.state import CAPTURED, CAPTURES, GRABBED, HIT_WALL, TAGGED, State, empty
+from mctf.state import CAPTURED, GRABBED, HIT_WALL, TAGGED, State, empty
+
+MOST_STEPS = 16  # that networks see in one; rollouts and buffers hold each step so many times
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -36,8 +40,10 @@ class Mctf:
     Attributes:
         rules: of the game.
         reward: what learners are paid for.
-        scale: (2, O) ranges of what players see.
+        scale: (2, O / k) ranges of what players see in a step.
+        last_steps: k, how many steps' observations networks see in one, the newest first.
         given: the settings it was made from, besides team_size.
+        starts: how games start; other than as the rules say only in ``practice``.
     """
 
     team_size: int
@@ -45,6 +51,7 @@ class Mctf:
     reward: Reward
     scale: npt.NDArray[np.float32]
     observation_size: int
+    last_steps: int
     longest: int
     given: Mapping[str, Any]
     name: str = "mctf"
@@ -52,38 +59,53 @@ class Mctf:
     actions: int = ACTIONS
     fixed_policies: tuple[str, ...] = field(default=FIXED_POLICIES)
     standard_policies: int = len(PAPER)
+    starts: Starts = BY_THE_RULES
 
     def __init__(
-        self, team_size: int, reward: str, reward_weights: Mapping[str, float | None] | None = None, **settings: Any
+        self,
+        team_size: int,
+        reward: str,
+        reward_weights: Mapping[str, float | None] | None = None,
+        last_steps: int = 1,
+        **settings: Any,
     ) -> None:
-        """Takes the settings of mctf.rules.make_rules and mctf.rewards.make_reward.
+        """Takes the settings of mctf.rules.make_rules, mctf.rewards.make_reward and mctf.shaping.make_shaping.
 
         Raises:
             ValueError: a setting is not allowed, or games would be too long to record.
         """
+        given = {"reward": reward, "reward_weights": reward_weights, "last_steps": last_steps, **settings}
+        shaping = {name: settings.pop(name) for name in BOUNDS if name in settings}
         rules = make_rules(team_size=team_size, **settings)
+        if not 1 <= last_steps <= MOST_STEPS:
+            raise ValueError(f"last_steps must be a whole number from 1 to {MOST_STEPS}, but is {last_steps!r}.")
         longest = math.ceil(rules.max_time_s / (rules.substeps * rules.tau_s)) + 1  # the clock adds up with rounding
         if longest > 1_000_000:
             raise ValueError(f"max_time_s gives games of {longest} steps; at most 1000000 are allowed.")
         object.__setattr__(self, "team_size", team_size)
         object.__setattr__(self, "rules", rules)
-        object.__setattr__(self, "reward", make_reward(reward, reward_weights))
+        object.__setattr__(self, "reward", make_reward(reward, reward_weights, shaping))
         object.__setattr__(self, "scale", ranges(rules))
-        object.__setattr__(self, "observation_size", self.scale.shape[1])
+        object.__setattr__(self, "last_steps", last_steps)
+        object.__setattr__(self, "observation_size", last_steps * self.scale.shape[1])
         object.__setattr__(self, "longest", longest)
-        object.__setattr__(self, "given", {"reward": reward, "reward_weights": reward_weights, **settings})
+        object.__setattr__(self, "given", given)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Returns how it is made again elsewhere: a compiled reward cannot travel, but its name can."""
-        return partial(Mctf, self.team_size, **self.given), ()
+        return partial(Mctf, self.team_size, **self.given), (), {"starts": self.starts}
+
+    def practice(self, starts: Starts) -> Mctf:
+        """Returns the game as it is played for practice, with other starts than the rules'."""
+        other = object.__new__(Mctf)
+        other.__dict__.update(self.__dict__, starts=starts)
+        return other
 
     def play(  # noqa: D102
         self, games: range, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results
     ) -> None:
-        scratch = blank_scratch(self, policies)
-        play_games(
-            games.start, games.stop, players, policies, seeds, results, self.rules, self.reward, self.scale, scratch
-        )
+        span, scratch = (games.start, games.stop), blank_scratch(self, policies)
+        play_games(*span, players, policies, seeds, results, self.rules, self.reward, self.scale, self.starts, scratch)
         if self.reward.has_own and len(results.rewards):
             check_paid(games, seeds, results)
 
@@ -109,9 +131,9 @@ class Scratch(NamedTuple):
 
     Attributes:
         state: of one game.
-        raw: (V, O) what is seen, in units.
-        before: (V, O) the same a step ago; kept only where a reward wants it.
-        seen: (V, O) float32, normalised.
+        raw: (V, O / k) what is seen, in units.
+        before: (V, O / k) the same a step ago; kept only where a reward wants it.
+        seen: (V, O) float32, normalised; of the last k steps, the newest first.
         actions: (V,).
         paid: (V,).
         terms: (len(TERMS),).
@@ -130,14 +152,14 @@ class Scratch(NamedTuple):
 
 def blank_scratch(env: Mctf, policies: Policies) -> Scratch:
     """Returns room for the games of ``env``, played by ``policies``."""
-    seen = (2 * env.team_size, env.observation_size)
+    vehicles, numbers = 2 * env.team_size, env.scale.shape[1]
     return Scratch(
         state=empty(1, env.rules),
-        raw=np.zeros(seen),
-        before=np.zeros(seen),
-        seen=np.zeros(seen, dtype=np.float32),
-        actions=np.zeros(seen[0], dtype=np.int64),
-        paid=np.zeros(seen[0]),
+        raw=np.zeros((vehicles, numbers)),
+        before=np.zeros((vehicles, numbers)),
+        seen=np.zeros((vehicles, env.observation_size), dtype=np.float32),
+        actions=np.zeros(vehicles, dtype=np.int64),
+        paid=np.zeros(vehicles),
         terms=np.zeros(len(TERMS)),
         work=np.zeros(2 * (policies.sizes.max() + 1), dtype=np.float32),
     )
@@ -154,6 +176,7 @@ def play_games(
     rules: Rules,
     reward: Reward,
     scale: np.ndarray,
+    starts: Starts,
     scratch: Scratch,
 ) -> None:
     """Plays games ``first`` to ``last - 1``, one after the other; see ``Env.play``.
@@ -167,7 +190,8 @@ def play_games(
         results: changed.
         rules: of the game.
         reward: of learners.
-        scale: (2, O) as of mctf.observe.ranges.
+        scale: (2, O / k) as of mctf.observe.ranges.
+        starts: of the games.
         scratch: changed.
     """
     state, raw, before, seen, actions = scratch.state, scratch.raw, scratch.before, scratch.seen, scratch.actions
@@ -176,8 +200,10 @@ def play_games(
         state.stream[0] = seeds[b]
         forget(state, 0, rules)
         reset(state, 0, rules)
+        practise(state, 0, starts, rules)
         moment = 0
         look(state, scale, rules, raw, seen)
+        repeat(seen, raw.shape[1])
         while finished(state, 0, rules) == RUNNING:
             for v in range(len(actions)):
                 actions[v] = chosen(policies, players[b, v], state, v, raw[v], seen[v], rules, scratch.work)
@@ -188,6 +214,7 @@ def play_games(
             step(state, 0, actions, rules)
             if record and reward.has_own:
                 remember(raw, before)
+            age(seen, raw.shape[1])
             look(state, scale, rules, raw, seen)
             if record:
                 rewards(reward, state, 0, rules, before, raw, scratch.terms, scratch.paid)
@@ -203,9 +230,25 @@ def play_games(
 
 @part
 def look(state: State, scale: np.ndarray, rules: Rules, raw: np.ndarray, seen: np.ndarray) -> None:
-    """Writes what all players see: ``raw`` (V, O) in units, ``seen`` (V, O) float32 as networks want it."""
+    """Writes what all players see: ``raw`` (V, O / k) in units, the first of ``seen`` (V, O) as networks want it."""
     observe(state, 0, rules, raw)
     normalise(raw, scale, rules, seen)
+
+
+@part
+def age(seen: np.ndarray, numbers: int) -> None:
+    """Moves what all players saw, (V, O) with ``numbers`` of each step, one step back; the oldest is forgotten."""
+    for v in range(seen.shape[0]):
+        for i in range(seen.shape[1] - 1, numbers - 1, -1):
+            seen[v, i] = seen[v, i - numbers]
+
+
+@part
+def repeat(seen: np.ndarray, numbers: int) -> None:
+    """Fills (V, O) with the first ``numbers`` of each row, as if all steps before had been like this one."""
+    for v in range(seen.shape[0]):
+        for i in range(numbers, seen.shape[1]):
+            seen[v, i] = seen[v, i - numbers]
 
 
 @part
@@ -247,11 +290,8 @@ def chosen(
 @part
 def settle(state: State, rules: Rules, b: int, results: Results) -> None:
     """Writes scores and events of the finished game to row ``b`` of ``results``; more captures win on time."""
-    end = finished(state, 0, rules)
-    gap = state.score[0, 0, CAPTURES] - state.score[0, 1, CAPTURES]
-    if end != TIME_OUT:
-        gap = 1 if end == BLUE_WON else -1 if end == RED_WON else 0
-    results.scores[b, 0] = 1.0 if gap > 0 else 0.5 if gap == 0 else 0.0
+    ahead = lead(state, 0, finished(state, 0, rules))
+    results.scores[b, 0] = 1.0 if ahead > 0 else 0.5 if ahead == 0 else 0.0
     results.scores[b, 1] = 1.0 - results.scores[b, 0]
     for v in range(rules.blue_size + rules.red_size):
         side = team_of(v, rules)

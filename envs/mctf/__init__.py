@@ -5,7 +5,7 @@ The rules and their order are those of Pyquaticus, of June 2024 or of November 2
 profiles    what the versions of the game differ in
 rules       numbers and switches of a game
 state       arrays of many games
-start       where a game begins
+start       where a game begins; practice, where else it may
 kernel      one step of one game, its end
 commands    from actions to what the controllers are asked for
 dynamics    motion of the vehicles in a step
@@ -14,7 +14,7 @@ keepout     the circle around the own flag
 events      grabs, tags, captures, untagging after it
 geometry    angles and distances
 observe     what a vehicle sees
-rewards     what a step is worth
+rewards     what a step is worth, with shaping
 scripted    the fixed policies
 draws       random numbers
 play        whole games of fixed policies

@@ -68,6 +68,7 @@ class Batch:
         actions: str = "discrete",
         observations: str = "normalised",
         threads: int = 1,
+        shaping: dict[str, float] | None = None,
     ) -> None:
         """Makes room; ``start`` begins.
 
@@ -79,13 +80,14 @@ class Batch:
             actions: as of the environment.
             observations: as of the environment.
             threads: that share the lanes.
+            shaping: as of ``rewards.make_reward``.
 
         Raises:
             ValueError: an argument is not allowed.
         """
         if not isinstance(rules, Rules):
             raise ValueError(f"rules must be of make_rules, but is {rules!r}.")
-        self.rules, self._reward = rules, make_reward(reward, reward_weights)
+        self.rules, self._reward = rules, make_reward(reward, reward_weights, shaping)
         self._view = make_view(actions, observations, rules)
         self._chunks = chunks(checked_count("lanes", lanes), checked_count("threads", threads))
         self._lanes = empty_lanes(lanes, rules)

@@ -89,3 +89,19 @@ def finished(state: State, b: int, rules: Rules) -> int:
     if not rules.clock_overruns:
         over = over or abs(state.time[b] - rules.max_time_s) <= 1e-8 + 1e-5 * rules.max_time_s  # as numpy.isclose
     return TIME_OUT if over else RUNNING
+
+
+@part
+def lead(state: State, b: int, end: int) -> int:
+    """Returns 1 if blue won game b, which ended as ``end`` says, -1 if red did, 0 for a draw.
+
+    More captures win on time.
+    """
+    if end == BLUE_WON:
+        return 1
+    if end == RED_WON:
+        return -1
+    if end == TIED:
+        return 0
+    gap = state.score[b, BLUE, CAPTURES] - state.score[b, RED, CAPTURES]
+    return 1 if gap > 0 else -1 if gap < 0 else 0

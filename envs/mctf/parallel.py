@@ -63,6 +63,7 @@ class MctfEnv(ParallelEnv[str, Any, Any]):
         observations: str = "normalised",
         render_mode: str | None = None,
         max_cycles: int | None = None,
+        shaping: Mapping[str, float] | None = None,
         **rules: Any,
     ) -> None:
         """Makes a game that ``reset`` starts.
@@ -74,6 +75,7 @@ class MctfEnv(ParallelEnv[str, Any, Any]):
             observations: "normalised" or "raw".
             render_mode: "human", "rgb_array", "ansi" or None.
             max_cycles: steps after which the game is over, as PettingZoo calls them; None for ``max_time_s``.
+            shaping: as of ``rewards.make_reward``.
             **rules: arguments of ``rules.make_rules``.
 
         Raises:
@@ -84,7 +86,7 @@ class MctfEnv(ParallelEnv[str, Any, Any]):
             check_word("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
         self.rules = _timed(make_rules(**rules), max_cycles, rules)
-        self._paid_for = reward, reward_weights
+        self._paid_for = reward, reward_weights, shaping
         self._view = make_view(actions, observations, self.rules)
         self._lanes, self._scratch = empty_lanes(1, self.rules), empty_scratch(self.rules)
         self._seeded = False

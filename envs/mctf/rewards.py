@@ -5,6 +5,7 @@ In the first step of a game nothing counts as new, as there is nothing to compar
 
 import math
 from collections.abc import Callable, Mapping
+from functools import cache
 from importlib import import_module
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -15,7 +16,9 @@ from numpy.typing import NDArray
 
 from mctf.compiled import kernel, part
 from mctf.geometry import apart, home, team_of
-from mctf.rules import Rules
+from mctf.kernel import RUNNING, finished, lead
+from mctf.rules import BLUE, Rules
+from mctf.shaping import Shaping, gained, make_shaping, share
 from mctf.state import State
 from mctf.words import did_you_mean
 
@@ -34,6 +37,9 @@ TERMS = (
     "tags_carrier",  # who carried the flag the step before
     "wall_hit",  # it hit a wall in the last sub-step, or is out of bounds
     "nearer_m",  # how much nearer it came to the opponents' flag's home, a carrier to its own
+    "won",  # the game is over since this step, and the team has won; on time, too: more captures win
+    "lost",
+    "drawn",
 )
 """What a reward is made of: counts of this step, and ``nearer_m`` in m."""
 (
@@ -51,6 +57,9 @@ TERMS = (
     TAGS_CARRIER,
     WALL_HIT,
     NEARER,
+    WON,
+    LOST,
+    DRAWN,
 ) = range(len(TERMS))
 
 WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
@@ -82,6 +91,7 @@ WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
                 "wall_hit": -100.0,
             }
         ),
+        "outcome": MappingProxyType({"won": 1.0, "lost": -1.0}),
     }
 )
 """The rewards by name; ``custom_rew2`` trained the paper's agents, and ``custom_rew`` is ``progress``."""
@@ -90,17 +100,19 @@ OWN_SIGNATURE = types.float64(*(types.Array(types.float64, 1, "C"),) * 3)
 
 
 class Reward(NamedTuple):
-    """How a step is paid: ``weights`` times terms, plus ``own(terms, before, after)`` if ``has_own``.
+    """How a step is paid: ``weights`` times terms, plus ``own(terms, before, after)`` if ``has_own``, then shaped.
 
     Attributes:
         weights: (len(TERMS),).
         has_own: whether ``own`` is called.
         own: compiled; takes (len(TERMS),), and (O,) twice: the unnormalised observation before and after the step.
+        shaping: what is added, and how the team shares.
     """
 
     weights: NDArray[np.float64]
     has_own: bool
     own: Any
+    shaping: Shaping
 
 
 def progress(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
@@ -123,7 +135,9 @@ def nothing(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDAr
 
 
 def make_reward(
-    reward: str | Callable[..., float] = "custom_rew2", weights: Mapping[str, float | None] | None = None
+    reward: str | Callable[..., float] = "custom_rew2",
+    weights: Mapping[str, float | None] | None = None,
+    shaping: Mapping[str, float] | None = None,
 ) -> Reward:
     """Returns a reward.
 
@@ -132,9 +146,10 @@ def make_reward(
             called as ``own(terms, before, after)`` for every vehicle and step and is compiled, so it must be of
             numbers and numpy only. A call that fails is worth NaN, which whoever plays the game must not accept.
         weights: of terms, by their names in ``TERMS``, in place of the reward's; 0 switches a term off, None leaves it.
+        shaping: attributes of ``shaping.Shaping``; what is not given is its default, which changes nothing.
 
     Raises:
-        ValueError: there is no such reward or term, or the function cannot be compiled.
+        ValueError: there is no such reward, term or attribute, or the function cannot be compiled.
     """
     given = {term: weight for term, weight in (weights or {}).items() if weight is not None}
     for term, weight in given.items():
@@ -143,16 +158,17 @@ def make_reward(
         if isinstance(weight, bool) or not isinstance(weight, int | float | np.number) or not math.isfinite(weight):
             raise ValueError(f"reward_weights[{term!r}] must be a finite number, but is {weight!r}.")
     named = WEIGHTS.get(reward, {}) if isinstance(reward, str) else {}
-    numbers = np.array([given.get(term, named.get(term, 0.0)) for term in TERMS], np.float64)
+    numbers, shaped = np.array([given.get(term, named.get(term, 0.0)) for term in TERMS]), make_shaping(shaping)
     if isinstance(reward, str) and reward in WEIGHTS:
         own = progress if reward == "custom_rew" else nothing
-        return Reward(numbers, own is progress, cfunc(OWN_SIGNATURE, nogil=True, cache=True)(own))
+        return Reward(numbers, own is progress, cfunc(OWN_SIGNATURE, nogil=True, cache=True)(own), shaped)
     own = _imported(reward) if isinstance(reward, str) else reward
     if not callable(own):
         raise ValueError(f"reward must be one of {tuple(WEIGHTS)}, a function or module:function, but is {reward!r}.")
-    return Reward(numbers, True, _compiled(own))
+    return Reward(numbers, True, _compiled(own), shaped)
 
 
+@cache
 def _compiled(own: Callable[..., float]) -> Any:
     """Returns a function as machine code that gives NaN where it fails."""
     try:
@@ -215,19 +231,24 @@ def rewards(
         terms: (len(TERMS),) scratch.
         out: (V,) float64, overwritten.
     """
+    end = finished(state, b, rules)
     for v in range(rules.blue_size + rules.red_size):
-        happened(state, b, v, rules, terms)
+        happened(state, b, v, end, rules, terms)
         total = 0.0
         for term in range(len(TERMS)):
             total += reward.weights[term] * terms[term]
         if reward.has_own:
             total += reward.own(terms, before[v], after[v])
+        if reward.shaping.potential != 0.0:
+            total += reward.shaping.potential * gained(state, b, v, end, reward.shaping, rules)
         out[v] = total
+    if reward.shaping.team_share != 0.0:
+        share(out, reward.shaping.team_share, rules)
 
 
 @part
-def happened(state: State, b: int, v: int, rules: Rules, out: np.ndarray) -> None:
-    """Writes the terms of vehicle ``v`` to ``out``."""
+def happened(state: State, b: int, v: int, end: int, rules: Rules, out: np.ndarray) -> None:
+    """Writes the terms of vehicle ``v`` to ``out``; ``end`` is as of ``finished``."""
     first = state.steps[b] <= 1
     us = team_of(v, rules)
     them = 1 - us
@@ -255,3 +276,7 @@ def happened(state: State, b: int, v: int, rules: Rules, out: np.ndarray) -> Non
         goal_x, goal_y = home(us if carries else them, rules)
         out[NEARER] = apart(state.was_pos[b, v, 0], state.was_pos[b, v, 1], goal_x, goal_y)
         out[NEARER] -= apart(state.pos[b, v, 0], state.pos[b, v, 1], goal_x, goal_y)
+    ahead = lead(state, b, end) * (1 if us == BLUE else -1)
+    out[WON] = end != RUNNING and ahead > 0
+    out[LOST] = end != RUNNING and ahead < 0
+    out[DRAWN] = end != RUNNING and ahead == 0

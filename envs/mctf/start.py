@@ -68,7 +68,7 @@ def place(state: State, b: int, v: int, rules: Rules) -> None:
     right = is_right(team, rules)
     state.heading[b, v] = -90.0 if right else 90.0
     if rules.starts == STARTS_RANDOM:
-        scatter(state, b, v, rules)
+        scatter(state, b, v, team, rules)
     elif rules.starts == STARTS_QUARTER:
         # On the team's quarter of the field; number 0 is the lowest
         state.pos[b, v, 0] = 3.0 * rules.width_m / 4.0 if right else rules.width_m / 4.0
@@ -80,9 +80,8 @@ def place(state: State, b: int, v: int, rules: Rules) -> None:
 
 
 @part
-def scatter(state: State, b: int, v: int, rules: Rules) -> None:
-    """Draws a start: anywhere on the own half, inside the walls, outside the keep-out circle, with any heading."""
-    team = team_of(v, rules)
+def scatter(state: State, b: int, v: int, team: int, rules: Rules) -> None:
+    """Draws a start: anywhere on a team's half, inside the walls, outside its keep-out circle, with any heading."""
     home_x, home_y = home(team, rules)
     margin = rules.agent_radius_m
     left = rules.width_m / 2.0 if is_right(team, rules) else margin
