@@ -13,6 +13,7 @@ from berteam_cli.config_groups import (
     EvaluationConfig,
     LearnerConfig,
     LoggerConfig,
+    OpponentsConfig,
     OptimizerConfig,
     PopulationConfig,
     SelectorConfig,
@@ -50,6 +51,7 @@ class TrainConfig(CommandConfig):
     learner: LearnerConfig = MISSING
     evaluation: EvaluationConfig = MISSING
     logger: LoggerConfig = MISSING
+    opponents: OpponentsConfig = MISSING
 
 
 @dataclass

@@ -88,6 +88,9 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "calibration": ("epoch", "decile", "teams", "predicted_elo", "elo", "low", "high"),
     "embeddings": ("epoch", "group", "members", "pairs", "cosine", "above_all"),
     "neighbours": ("epoch", "agent", "name", "rank", "neighbour", "neighbour_name", "cosine"),
+    "opponents": (
+        *("epoch", "kind", "opponent", "taken_epoch", "games", "wins", "draws", "losses", "chance", "estimate"),
+    ),
 }
 GROWING = (
     *("agents", "team_distribution", "captain_distribution", "island_distribution"),
@@ -95,6 +98,7 @@ GROWING = (
 )
 """Tables that get rows in every epoch, or in every recorded one."""
 SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row in "games" has no room for all
+OPPONENTS_TABLE = "opponents"  # grows too, where others than the population's teams are met
 BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
 EVALUATION = "evaluation"
 """The folder in a run's, where `berteam evaluate` writes."""

@@ -76,7 +76,7 @@ def figures_of(run: Run, report: Report, parts: Parts, state: Mapping[str, float
         parts: of the run.
         state: of the selector after it: effective_teams, entropy, exploitability.
     """
-    seconds, games = report.seconds, len(report.outcomes.lineups)
+    seconds, games = report.seconds, len(report.outcomes.lineups) + len(report.met.teams)
     figures = {f"timing/{name}": value for name, value in seconds.items()}
     if seconds.get("play_s"):
         figures |= {
