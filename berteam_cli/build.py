@@ -22,6 +22,9 @@ from berteam_cli.errors import InputError
 from berteam_cli.founding import archipelago, check_policies
 from berteam_cli.games import Games
 from berteam_cli.memory import check_memory
+from berteam_cli.opponents.none import Nobody
+from berteam_cli.opposing import opponents as opposing
+from berteam_cli.opposing import without_exploiters
 from berteam_cli.optimizer.aggression import opponents
 from berteam_cli.optimizer.base import Optimizer
 from berteam_cli.optimizer.coevolution import Coevolution
@@ -118,14 +121,16 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
         )
     check_watched(config.evaluate_every, playing.env)
     improving = optimizer(config, islands, playing)
+    others = opposing(config, islands, playing.env, learning=improving.learns)
+    own = config.games_per_epoch - others.games
     selecting = selector(config, field_of(config, islands, playing.env), playing.env, device)
-    if selecting.answers and config.games_per_epoch % 2:
+    if selecting.answers and own % 2:
         raise InputError(
             "games_per_epoch must be even with selector.observations=previous_game, which plays every opponent twice, "
-            f"but is {config.games_per_epoch}."
+            f"but is {config.games_per_epoch}{f', {others.games} of them against opponents' if others.games else ''}."
         )
     watched = improving.learns or selecting.observes
-    games_kept = config.games_per_epoch // rounds(selecting) if watched and not read_only else 0
+    games_kept = own // rounds(selecting) + others.games if watched and not read_only else 0
     if not read_only:
         # Both halves of an epoch of answers, and all of it in one piece.
         check_memory(islands, playing.env, 4 * games_kept if selecting.answers else games_kept)
@@ -137,6 +142,7 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
         optimizer=improving,
         room=blank_trajectories(playing.env, games_kept) if games_kept else None,
         curriculum=curriculum(config.curriculum, playing.env),
+        opponents=Nobody(playing.env.sides, playing.env.team_size) if read_only else others,
     )
 
 
@@ -202,6 +208,7 @@ def field_of(config: TrainConfig, islands: tuple[Island, ...], game: Env) -> Fie
             valid = allowed(places, [island.name for island in islands], owners, config.team_size)
     except ValueError as error:
         raise InputError(str(error)) from error
+    valid = without_exploiters(valid, islands, owners, config.team_size)
     return Field(owners, config.team_size, game.sides, valid, config.selector.exact_limit)
 
 

@@ -18,6 +18,8 @@ from safetensors.torch import load_file, save_file
 
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.fitting import check_run, check_said
+from berteam_cli.opponents import pool
+from berteam_cli.opponents.league import League
 from berteam_cli.population import ARRAYS, Population
 from berteam_cli.tensors import below
 from berteam_cli.training import Parts, Run
@@ -73,6 +75,16 @@ def save(folder: Path, saved: Saved, parts: Parts) -> None:
     here = whole.index(final)
     for other in (*whole[: max(0, here + 1 - KEPT)], *whole[here + 1 :]):
         shutil.rmtree(other)
+    pool.pruned(folder / pool.POOL, pooled(place))
+
+
+def pooled(place: Path) -> set[str]:
+    """Returns the files of the pool that the checkpoints in folder ``place`` need, as far as they can be read."""
+    needed: set[str] = set()
+    for state in place.glob("epoch_*/state.json"):
+        with contextlib.suppress(*DAMAGES):
+            needed |= set(json.loads(state.read_text(encoding="utf-8"))["pool"])
+    return needed
 
 
 def write(part: Path, saved: Saved, parts: Parts) -> None:
@@ -93,6 +105,7 @@ def write(part: Path, saved: Saved, parts: Parts) -> None:
         "steps": run.steps,
         "seconds": saved.seconds,
         "table_sizes": saved.table_sizes,
+        "pool": pool.names(run.league),
         "crc32": file_sum(part / "tensors.safetensors"),
     }
     said["checksum"] = state_sum(said)
@@ -165,7 +178,10 @@ def read(place: Path, parts: Parts) -> Saved:
     )
     arrays = {name: tensors[f"population.{name}"].numpy() for name in ARRAYS}
     selection = parts.selector.restored(below(tensors, "selector."))
-    run = Run(said["epoch"], Population(minds=minds, **arrays), selection, said["played"], said["steps"])
+    league = None
+    if isinstance(parts.opponents, League):
+        league = pool.restored(below(tensors, "league."), place.parent.parent / pool.POOL)
+    run = Run(said["epoch"], Population(minds=minds, **arrays), selection, said["played"], said["steps"], league)
     check_run(run, parts)
     return Saved(run, said["table_sizes"], said["seconds"])
 
@@ -176,6 +192,7 @@ def tensors_of(run: Run, parts: Parts) -> dict[str, torch.Tensor]:
     for i, (island, mind) in enumerate(zip(parts.optimizer.islands, run.population.minds, strict=True)):
         tensors |= {f"island.{i}.{name}": tensor for name, tensor in island.learner.tensors(mind).items()}
     tensors |= {f"selector.{name}": tensor for name, tensor in parts.selector.tensors(run.selection).items()}
+    tensors |= {f"league.{name}": tensor for name, tensor in parts.opponents.tensors(run.league).items()}
     return {name: alone(tensor.detach().cpu().contiguous()) for name, tensor in tensors.items()}
 
 

@@ -44,6 +44,12 @@ SCHEMAS: dict[str, dict[str, type]] = {
         "sb3": config_groups.Sb3Config,
     },
     "population": {"islands": config_groups.PopulationConfig},
+    "opponents": {
+        "none": config_groups.OpponentsConfig,
+        "past": config_groups.PastConfig,
+        "scripted": config_groups.ScriptedConfig,
+        "league": config_groups.LeagueConfig,
+    },
     "evaluation": {"truth": config_groups.EvaluationConfig},
     "logger": {
         "csv": config_groups.LoggerConfig,

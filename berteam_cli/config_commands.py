@@ -14,6 +14,7 @@ from berteam_cli.config_groups import (
     EvaluationConfig,
     LearnerConfig,
     LoggerConfig,
+    OpponentsConfig,
     OptimizerConfig,
     PopulationConfig,
     SelectorConfig,
@@ -54,6 +55,7 @@ class TrainConfig(CommandConfig):
     evaluation: EvaluationConfig = MISSING
     logger: LoggerConfig = MISSING
     curriculum: CurriculumConfig = MISSING
+    opponents: OpponentsConfig = MISSING
 
 
 @dataclass

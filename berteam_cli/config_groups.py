@@ -409,3 +409,43 @@ class MlflowConfig(LoggerConfig):
 
     experiment: str = MISSING
     tracking: str | None = MISSING
+
+
+@dataclass
+class OpponentsConfig:
+    """Whom the population meets beside itself; the choice none has no settings."""
+
+    name: str = MISSING
+
+
+@dataclass
+class PastConfig(OpponentsConfig):
+    """Settings of opponents/past.py."""
+
+    past_share: float = number(0, 1)
+    snapshot_every: int = number(1)
+    snapshot_members: int | None = number(1)
+    pool_size: int = number(2)
+    draw: str = choice("uniform", "prioritised")
+    power: float = number(0, 100)
+    mix_uniform: float = number(0, 1)
+    prior_games: float = number(open_low=True)
+    half_life: float = number()
+
+
+@dataclass
+class ScriptedConfig(OpponentsConfig):
+    """Settings of opponents/scripted.py."""
+
+    scripted_share: float = number(0, 1)
+    scripted: list[str] = MISSING
+
+
+@dataclass
+class LeagueConfig(PastConfig, ScriptedConfig):
+    """Settings of opponents/league.py, with those of opponents/exploiters.py."""
+
+    exploiters: list[str] = MISSING
+    exploit_share: float = number(0, 1)
+    exploiter_epochs: int = number()
+    exploiter_score: float = number(0, 1)

@@ -47,6 +47,12 @@ def check_run(run: Run, parts: Parts) -> None:
         if array.dtype != kind or array.shape != (members,):
             raise ValueError(f"its {name} are not of {members} members: {array.dtype} of shape {array.shape}")
     check_policies(policies(islands, run.population, explore=False), parts.games.env)
+    for snapshot in run.league.pool if run.league else ():
+        check_policies(snapshot.policies, parts.games.env)
+        if not (snapshot.epoch >= 0 and (snapshot.members >= 0).all() and (snapshot.members < members).all()):
+            raise ValueError("its pool names members that there are not")
+    if run.league and [x.island for x in run.league.attempts] != [k for k, x in enumerate(islands) if x.exploits]:
+        raise ValueError("its exploiters are of other islands")
     for name, tensor in parts.selector.tensors(run.selection).items():
         if name.rpartition(".")[2] in MEMBERS and tensor.numel() and not OPEN <= tensor.min() <= tensor.max() < members:
             raise ValueError(f"its selector.{name} names members that there are not")

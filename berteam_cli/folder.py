@@ -50,7 +50,7 @@ def claim(folder: Path, on_exists: str) -> None:
         )
     try:
         os.truncate(folder / LOG, 0)  # it is what the folder is held by
-        for name in ("checkpoint", "tensorboard"):
+        for name in ("checkpoint", "pool", "tensorboard"):
             shutil.rmtree(folder / name, ignore_errors=True)
         for sheet, ending in product(SHEETS, SHEET_ENDINGS):
             (folder / EVALUATION / f"{sheet}{ending}").unlink(missing_ok=True)
@@ -239,7 +239,7 @@ class Lines(logging.FileHandler):
 
 FACTS = {"status": str, "started": str, "command": list, "resumed": list, "overrides": list, "error": str}
 """Kinds of what commands read of a manifest."""
-INSIDE = ("checkpoint", EVALUATION, "report", "replay", "tensorboard", "mlflow", "wandb")
+INSIDE = ("checkpoint", "pool", EVALUATION, "report", "replay", "tensorboard", "mlflow", "wandb")
 """Folders in that of a run, where commands read and write."""
 
 

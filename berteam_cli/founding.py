@@ -10,7 +10,7 @@ from typing import Any
 
 from berteam_cli.acting import Policies, joined
 from berteam_cli.config_commands import TrainConfig
-from berteam_cli.config_groups import IslandConfig, LearnerConfig, MemberConfig
+from berteam_cli.config_groups import IslandConfig, LeagueConfig, LearnerConfig, MemberConfig
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError
@@ -47,6 +47,7 @@ def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) ->
         InputError: there is none, or its learner or a file does not fit.
     """
     islands: list[Island] = []
+    exploiters = config.opponents.exploiters if isinstance(config.opponents, LeagueConfig) else []
     for name, settings in config.population.islands.items():
         key = f"population.islands.{name}"
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or name.lower() in NO_NAMES:
@@ -57,7 +58,7 @@ def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) ->
         else:
             typed = len(config.population.islands) == 1 and settings.learner == config.learner
             made = learner(settings.learner, game, "learner" if typed else f"{key}.learner", device)
-        islands.append(Island(name, first, settings.size, made))
+        islands.append(Island(name, first, settings.size, made, name in exploiters))
     if members := config.population.members:
         if MEMBERS in config.population.islands:
             raise InputError(

@@ -45,6 +45,10 @@ class Lineups:
     def __len__(self) -> int:
         return len(self.teams)
 
+    def followed_by(self, later: Lineups) -> Lineups:
+        """Returns these games and then ``later`` ones."""
+        return Lineups(*joined_fields(self, later))
+
 
 @dataclass(frozen=True)
 class Outcomes:
@@ -71,8 +75,12 @@ class Outcomes:
 
     def followed_by(self, later: Outcomes) -> Outcomes:
         """Returns these games and then those of ``later``."""
-        lineups = Lineups(*joined_fields(self.lineups, later.lineups))
-        return Outcomes(lineups, *joined_fields(self, later)[1:])
+        return Outcomes(self.lineups.followed_by(later.lineups), *joined_fields(self, later)[1:])
+
+    def of(self, games: slice) -> Outcomes:
+        """Returns those of some of the games."""
+        lineups = Lineups(*cut_fields(self.lineups, games))
+        return Outcomes(lineups, *cut_fields(self, games)[1:])
 
     def event(self, name: str) -> Ints:
         """Returns (B, S) how often ``name``, one of EVENTS, happened to each side."""
@@ -105,6 +113,10 @@ class Experience:
         """Returns that of these games and then that of ``later``."""
         return Experience(*joined_fields(self, later))
 
+    def of_first(self, games: int, played: int) -> Experience:
+        """Returns that of the first ``games`` of the ``played`` games it is of; no copies."""
+        return Experience(*cut_fields(self, slice(games * (len(self.members) // max(played, 1)))))
+
     def trajectories(self, first: int, size: int) -> dict[int, list[tuple[int, int]]]:
         """Returns (game, player) of each trajectory, in order, of every member that played.
 
@@ -121,6 +133,12 @@ class Experience:
         for k in order:
             played.setdefault(int(row[k]), []).append((int(game[k]), int(player[k])))
         return played
+
+
+def cut_fields(record: Any, rows: slice) -> list[Any]:
+    """Returns ``rows`` of the arrays of a record; fields that hold no array come as None."""
+    values = (getattr(record, x.name) for x in fields(record))
+    return [value[rows] if isinstance(value, np.ndarray) else None for value in values]
 
 
 def joined_fields(first: Any, second: Any) -> list[Any]:

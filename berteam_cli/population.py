@@ -22,12 +22,14 @@ class Island:
         first: index of its first member in the population.
         size: M, how many members it has.
         learner: how they learn.
+        exploits: whether they are never chosen for teams, but play against those who are.
     """
 
     name: str
     first: int
     size: int
     learner: Learner[Any]
+    exploits: bool = False
 
     @property
     def members(self) -> slice:

@@ -13,9 +13,19 @@ from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.evaluation.sight import Sight
 from berteam_cli.evaluation.watching import Watching
 from berteam_cli.learner.base import LEARNING_FIGURES
-from berteam_cli.outcomes import SIDES, Outcomes
+from berteam_cli.opponents.base import Guest, Met, Opponents
+from berteam_cli.outcomes import NOBODY, SIDES, Outcomes
 from berteam_cli.population import island_of, names
-from berteam_cli.records import BY_SIDE_TABLE, COLUMNS, SIDES_TABLE, WATCHED_TABLE, Tables, team_name, team_names
+from berteam_cli.records import (
+    BY_SIDE_TABLE,
+    COLUMNS,
+    OPPONENTS_TABLE,
+    SIDES_TABLE,
+    WATCHED_TABLE,
+    Tables,
+    team_name,
+    team_names,
+)
 from berteam_cli.selector.base import TeamDistribution, measured
 from berteam_cli.training import RECORDS, Clock, Parts, Report, Run, generator
 
@@ -24,8 +34,8 @@ Row = tuple[Any, ...]
 
 def also_growing(parts: Parts, *, watched: bool) -> list[str]:
     """Returns the tables that only runs of such ``parts`` have, or such as are ``watched`` while they go on."""
-    several, apart = parts.games.env.sides > 2, parts.selector.by_side
-    asked = ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart), (WATCHED_TABLE, watched))
+    several, apart, met = parts.games.env.sides > 2, parts.selector.by_side, parts.opponents.games > 0
+    asked = ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart), (WATCHED_TABLE, watched), (OPPONENTS_TABLE, met))
     return [name for name, there in asked if there]
 
 
@@ -66,6 +76,8 @@ class Recorder:
         self.tables.add("games", game_rows(run.epoch, report.outcomes))
         if self.parts.games.env.sides > 2:
             self.tables.add(SIDES_TABLE, side_rows(run.epoch, report.outcomes))
+        if self.parts.opponents.games:
+            self.tables.add(OPPONENTS_TABLE, opponent_rows(run, report.met, self.parts.opponents))
         self.tables.add("learning", self.learning_rows(run, report))
         self.tables.add("generations", self.generation_rows(run, report))
         figures = (selecting.loss, selecting.updates, selecting.buffer, effective, entropy, exploited)
@@ -179,3 +191,15 @@ def side_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:
     lineups, scores = outcomes.lineups, outcomes.scores
     for b, s in np.ndindex(scores.shape):
         yield epoch, b, SIDES[s], team_name(lineups.teams[b, s]), lineups.captains[b, s], scores[b, s]
+
+
+def opponent_rows(run: Run, met: Met, opponents: Opponents) -> Iterator[Row]:
+    """Returns one row for each opponent that the selector's teams met, with what they scored; as it stands after."""
+    scores: dict[Guest, list[float]] = {}
+    for met_there, beaten in zip(met.teams, met.beaten, strict=True):
+        scores.setdefault(met_there._replace(side=NOBODY), []).append(float(beaten))
+    for guest, games in scores.items():
+        wins, losses = games.count(1.0), games.count(0.0)
+        taken = "" if guest.epoch == NOBODY else guest.epoch
+        counts = (len(games), wins, len(games) - wins - losses, losses)
+        yield (run.epoch, guest.kind, guest.name, taken, *counts, *opponents.standing(run.league, guest))

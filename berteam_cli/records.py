@@ -94,6 +94,9 @@ COLUMNS: dict[str, tuple[str, ...]] = {
         *("captures", "grabs", "tags", "wall_hits", "opponent_captures", "opponent_grabs", "opponent_tags", "steps"),
         *("elo", "elo_low", "elo_high", "members"),
     ),
+    "opponents": (
+        *("epoch", "kind", "opponent", "taken_epoch", "games", "wins", "draws", "losses", "chance", "estimate"),
+    ),
 }
 GROWING = (
     *("agents", "team_distribution", "captain_distribution", "island_distribution"),
@@ -101,6 +104,7 @@ GROWING = (
 )
 """Tables that get rows in every epoch, or in every recorded one."""
 SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row in "games" has no room for all
+OPPONENTS_TABLE = "opponents"  # grows too, where others than the population's teams are met
 BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
 WATCHED_TABLE = "evaluation"  # grows too, where the run is looked at while it goes on (evaluate_every)
 EVALUATION = "evaluation"

@@ -86,7 +86,7 @@ def stored_config(folder: Path, trust: Collection[str] = ()) -> DictConfig:
     plain = plain_config(folder)
     try:
         typed = OmegaConf.structured(TrainConfig)
-        for group in ("env", "selector", "optimizer", "learner", "logger"):
+        for group in ("env", "selector", "optimizer", "learner", "logger", "opponents"):
             typed[group] = OmegaConf.structured(SCHEMAS[group][plain[group].name])
         typed.evaluation = OmegaConf.structured(SCHEMAS["evaluation"]["truth"])
         typed.curriculum = OmegaConf.structured(SCHEMAS["curriculum"]["none"])

@@ -14,8 +14,9 @@ from berteam_cli.curriculum import Curriculum
 from berteam_cli.env.base import Trajectories
 from berteam_cli.games import Games, as_side_0, both_sides
 from berteam_cli.learner.base import Learning
+from berteam_cli.opponents.base import Met, Opponents
 from berteam_cli.optimizer.base import Optimizer, Replacement
-from berteam_cli.outcomes import Ints, Outcomes
+from berteam_cli.outcomes import Ints, Lineups, Outcomes
 from berteam_cli.population import Population, founded, policies
 from berteam_cli.selector.base import Answering, Selecting, Selector
 
@@ -28,12 +29,13 @@ class Parts:
 
     Attributes:
         seed: of all chance.
-        games_per_epoch: B.
+        games_per_epoch: B, those against other opponents included.
         games: what is played.
         selector: who chooses teams.
         optimizer: what makes members better.
         room: where the trajectories of an epoch's games go, the same in every epoch; None where nobody looks.
         curriculum: how the games start from which members learn.
+        opponents: who brings other opponents than the population's teams.
     """
 
     seed: int
@@ -43,6 +45,7 @@ class Parts:
     optimizer: Optimizer
     room: Trajectories | None
     curriculum: Curriculum
+    opponents: Opponents
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,7 @@ class Run:
         selection: what the selector has learnt.
         played: games of all epochs.
         steps: of those games and of the probing games.
+        league: the state of who brings other opponents.
     """
 
     epoch: int
@@ -62,13 +66,15 @@ class Run:
     selection: Any
     played: int = 0
     steps: int = 0
+    league: Any = None
 
 
 @dataclass
 class Report:
-    """What happened in one epoch, for the tables."""
+    """What happened in one epoch, for the tables; ``outcomes`` are those of games among the population's teams."""
 
     outcomes: Outcomes
+    met: Met
     learnt: list[tuple[int, Learning]] = field(default_factory=list)
     replaced: list[Replacement] = field(default_factory=list)
     selecting: Selecting = field(default_factory=Selecting)
@@ -85,39 +91,48 @@ def begin(parts: Parts) -> Run:
     """Returns the run before its first epoch."""
     people, selection = generator(parts.seed, FOUNDING).spawn(2)
     population = founded(parts.optimizer.islands, parts.optimizer.fitness.initial, people)
-    return Run(0, population, parts.selector.init(selection))
+    return Run(0, population, parts.selector.init(selection), league=parts.opponents.begun(population))
 
 
 def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     """Selects teams, plays, rates, learns, renews, and learns to select (paper, Algorithm 1)."""
-    select, play, learn, probe, renew, study = generator(parts.seed, EPOCHS, run.epoch).spawn(6)
-    selector, optimizer, population = parts.selector, parts.optimizer, run.population
+    select, play, learn, probe, renew, study, meet = generator(parts.seed, EPOCHS, run.epoch).spawn(7)
+    selector, optimizer, opponents, population = parts.selector, parts.optimizer, parts.opponents, run.population
     clock = Clock()
 
-    lineups = selector.select(run.selection, parts.games_per_epoch // rounds(selector), population.age, select)
+    def choose(games: int, rng: Generator) -> Lineups:
+        return selector.select(run.selection, games, population.age, rng)
+
+    lineups = choose((parts.games_per_epoch - opponents.games) // rounds(selector), select)
+    guests = opponents.invited(run.league, population.size, choose, meet)
     clock.lap("select_s")
-    acting = policies(optimizer.islands, population, explore=True)
-    games = parts.curriculum.practice(parts.games, run.epoch)
-    outcomes, experience = games.play(acting, lineups, key(play), record=watched(parts), room=parts.room)
+    acting = joined([policies(optimizer.islands, population, explore=True), guests.policies])
+    practice, all_games = parts.curriculum.practice(parts.games, run.epoch), lineups.followed_by(guests.lineups)
+    played, lived = practice.play(acting, all_games, key(play), record=watched(parts), room=parts.room)
+    outcomes, met = played.of(slice(len(lineups))), Met(guests.teams, played.of(slice(len(lineups), None)))
+    seen = lived.of_first(len(lineups), len(all_games))
     if selector.answers:  # each opponent once more, with teams chosen on what was seen of it
-        lineups = cast("Answering[Any]", selector).answer(run.selection, lineups, experience, population.age, select)
-        again = games.play(acting, lineups, key(play), record=True)
-        outcomes, experience = outcomes.followed_by(again[0]), experience.followed_by(again[1])
+        lineups = cast("Answering[Any]", selector).answer(run.selection, lineups, seen, population.age, select)
+        again = practice.play(acting, lineups, key(play), record=True)
+        outcomes, seen = outcomes.followed_by(again[0]), seen.followed_by(again[1])
+        lived = lived.followed_by(again[1])
     population = optimizer.rate(population, outcomes)
     clock.lap("play_s")
-    population, learnt, healed = optimizer.train(population, experience, learn)
+    population, learnt, healed = optimizer.train(population, lived, learn)
     clock.lap("learn_s")
     probes = Probes(parts, key(probe))
     population = optimizer.project(population, run.epoch + 1, probes.play)
     clock.lap("probe_s")
     population, replaced = optimizer.renew(population, renew)
+    population, league = opponents.renewed(run.league, met, population, run.epoch + 1, meet)
     clock.lap("renew_s")
-    selection, selecting = selector.learn(run.selection, outcomes, experience, population.fitness, study)
+    selection, selecting = selector.learn(run.selection, outcomes, seen, population.fitness, study)
     clock.lap("selector_s")
 
-    steps = int(outcomes.steps.sum()) + probes.steps
-    after = Run(run.epoch + 1, population, selection, run.played + len(outcomes.scores), run.steps + steps)
-    return after, Report(outcomes, learnt, healed + replaced, selecting, steps, clock.laps)
+    games = len(outcomes.scores) + len(met.teams)
+    steps = int(outcomes.steps.sum()) + int(met.outcomes.steps.sum()) + probes.steps
+    after = Run(run.epoch + 1, population, selection, run.played + games, run.steps + steps, league)
+    return after, Report(outcomes, met, learnt, healed + replaced, selecting, steps, clock.laps)
 
 
 def rounds(selector: Selector[Any]) -> int:

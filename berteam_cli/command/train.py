@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from berteam_cli.live import View, shown
 from berteam_cli.logger.base import Once
 from berteam_cli.logger.opening import check_logger, figures_of, logger, seen
 from berteam_cli.memory import spoken, state_bytes
+from berteam_cli.opponents import pool
 from berteam_cli.pace import Pace
 from berteam_cli.recording import Recorder, also_growing
 from berteam_cli.records import Tables
@@ -70,9 +72,13 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         for remark in (*parts.selector.remarks(), *discounts(parts.optimizer.islands, parts.games.env)):
             log.info("%s", remark)
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
+        if against := parts.opponents.remarks():
+            log.info("Trained against %s, beside teams of the population.", "; ".join(against))
         if saved:
             log.info("Going on after epoch %d of %d.", saved.run.epoch, config.epochs)
         manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
+        if against:
+            manifest.add(trained_against="; ".join(against))
         with manifest.until_the_end(), stoppable() as stop:
             told: Any = OmegaConf.to_container(OmegaConf.create(text))
             with logger(config.logger, folder, manifest.facts, told) as also:
@@ -115,6 +121,7 @@ def trained(
     recorder = Recorder(tables, parts, config.record_every, Exploiting(parts, config.payoff_steps), watching)
     seconds = saved.seconds if saved else 0.0
     run = saved.run if saved else begin(parts)
+    run = replace(run, league=pool.on_disk(run.league, folder / pool.POOL))
 
     def keep() -> None:
         also.logger.flush()
@@ -134,6 +141,7 @@ def trained(
         while run.epoch < config.epochs:
             stop.in_epoch = True
             run, report = epoch(run, parts)
+            run = replace(run, league=pool.on_disk(run.league, folder / pool.POOL))
             state, distribution, sight = recorder.epoch(run, report)
             also(run.epoch, figures_of(run, report, parts, state, sight))
             pace.tell(run.epoch, config.games_per_epoch)

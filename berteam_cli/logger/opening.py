@@ -80,7 +80,7 @@ def figures_of(
         state: of the selector after it: effective_teams, entropy, exploitability.
         sight: what was seen of it against fixed teams; None where it was not looked at.
     """
-    seconds, games = report.seconds, len(report.outcomes.lineups)
+    seconds, games = report.seconds, len(report.outcomes.lineups) + len(report.met.teams)
     figures = {f"timing/{name}": value for name, value in seconds.items()}
     if seconds.get("play_s"):
         figures |= {

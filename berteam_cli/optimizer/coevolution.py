@@ -122,7 +122,12 @@ class Coevolution(Fixed):
         return candidates, self.fitness.removal_chances(population.fitness[candidates]) if len(candidates) else empty()
 
     def candidates(self, population: Population, island: Island) -> Ints:
-        """Returns the members of ``island`` that are no elites, nor protected where those are not drawn."""
+        """Returns the members of ``island`` that are no elites, nor protected where those are not drawn.
+
+        Nobody of exploiters, whose games are not rated.
+        """
+        if island.exploits:
+            return np.zeros(0, dtype=np.int64)
         everyone = np.arange(island.first, island.first + island.size)
         fittest_first = everyone[np.argsort(-population.fitness[everyone], kind="stable")]
         candidates = np.sort(fittest_first[self.elites :])

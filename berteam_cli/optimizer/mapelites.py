@@ -51,7 +51,7 @@ class MapElites(Coevolution):
             [
                 island.first + np.flatnonzero(population.stale[island.members])
                 for island in self.islands
-                if (population.age[island.members] > self.protect_new).any()
+                if (population.age[island.members] > self.protect_new).any() and not island.exploits
             ]
             or [np.zeros(0, dtype=np.int64)]
         )

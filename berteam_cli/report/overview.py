@@ -28,6 +28,8 @@ MOST_ROWS = 60
 def headline(source: Source) -> dict[str, str]:
     """Returns the figures that sum up a run, by name."""
     facts: dict[str, str] = {"Status": str(source.manifest["status"])}
+    if against := source.manifest.get("trained_against"):
+        facts["Trained against"] = str(against)
     summary, timing = source.table("summary"), source.table("timing")
     if summary is not None and not math.isnan(summary.expected_elo[0]):
         row = summary.iloc[0]
@@ -57,6 +59,7 @@ def row_of(source: Source) -> dict[str, str]:
     facts |= {name: str(chosen.get(name.lower(), {}).get("name", "")) for name in ("Selector", "Optimizer", "Env")}
     facts["Seed"] = str(source.manifest.get("seed", ""))
     figures = headline(source)
+    facts["Trained against"] = figures.get("Trained against", "its population")
     return facts | {x: figures.get(x, "") for x in ("Status", "Epochs", "Expected Elo", "Best team", "Its Elo", "Time")}
 
 

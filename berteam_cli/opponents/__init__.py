@@ -1,0 +1,1 @@
+"""Opponents beyond the present population: its past, scripted policies, and islands that exploit it."""

@@ -1,0 +1,123 @@
+"""The files of the pool: a snapshot each, which is written once and never changed, and read where it is met.
+
+So a checkpoint only says which of them are its own. What a run wrote after its last checkpoint is written again, to the
+same bytes, when it goes on from there.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from berteam_cli.acting import DEEPEST, Policies
+from berteam_cli.opponents.exploiters import Attempt
+from berteam_cli.opponents.league import LeagueState
+from berteam_cli.opponents.past import Snapshot
+from berteam_cli.opponents.record import Record
+
+POOL = "pool"
+"""The folder in a run's, where its snapshots are."""
+
+
+def row_type(weights: int) -> npt.DTypeLike:
+    """Returns what a member is in a file: its place in the population, then its row of Policies."""
+    return [
+        *(("member", "<i8"), ("sizes", "<i4", (DEEPEST + 2,)), ("epsilon", "<f4"), ("fixed", "<i2")),
+        *(("kind", "i1"), ("tanh", "?"), ("weights", "<f4", (weights,))),
+    ]
+
+
+def file_name(epoch: int, island: int) -> str:
+    """Returns the name of a snapshot's file; ``island`` as of Snapshot."""
+    return f"{epoch:08d}.npy" if island < 0 else f"{epoch:08d}_{island}.npy"
+
+
+def names(state: LeagueState | None) -> list[str]:
+    """Returns the files that ``state`` needs."""
+    return [file_name(*snapshot.key) for snapshot in state.pool] if state else []
+
+
+def on_disk(state: LeagueState | None, folder: Path) -> LeagueState | None:
+    """Returns ``state`` with every snapshot in a file of ``folder``, and no longer in memory.
+
+    Raises:
+        OSError: there is no room.
+    """
+    if state is None or all(snapshot.checksum for snapshot in state.pool):
+        return state
+    folder.mkdir(exist_ok=True)
+    return replace(state, pool=tuple(x if x.checksum else written(x, folder) for x in state.pool))
+
+
+def written(snapshot: Snapshot, folder: Path) -> Snapshot:
+    """Writes a snapshot; returns it as it lies in its file.
+
+    Raises:
+        OSError: there is no room.
+    """
+    rows = np.zeros(len(snapshot.members), dtype=row_type(snapshot.policies.weights.shape[1]))
+    rows["member"] = snapshot.members
+    for name, column in snapshot.policies._asdict().items():
+        rows[name] = column
+    path = folder / file_name(*snapshot.key)
+    part = path.with_suffix(".part")
+    try:
+        with part.open("wb") as file:
+            np.save(file, rows, allow_pickle=False)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+    return opened(folder, snapshot.epoch, snapshot.island, snapshot.record)
+
+
+def opened(folder: Path, epoch: int, island: int, record: Record) -> Snapshot:
+    """Returns the snapshot in its file of ``folder``, mapped into memory.
+
+    Raises:
+        OSError: there is none.
+        ValueError: the file holds something else.
+    """
+    rows = np.load(folder / file_name(epoch, island), mmap_mode="r", allow_pickle=False)
+    weights = rows.dtype["weights"].shape[0] if rows.dtype.names else 0
+    if rows.dtype != np.dtype(row_type(weights)) or rows.ndim != 1 or not len(rows):
+        raise ValueError(f"{file_name(epoch, island)} is no snapshot")
+    policies = Policies(**{name: rows[name] for name in Policies._fields})
+    return Snapshot(epoch, island, rows["member"], policies, record, checksum(rows))
+
+
+def checksum(rows: npt.NDArray[Any]) -> int:
+    """Returns CRC-32 of a snapshot's rows; never 0, which stands for none."""
+    return zlib.crc32(rows.view(np.uint8).data) or 1
+
+
+def restored(tensors: dict[str, Any], folder: Path) -> LeagueState:
+    """Returns the state of a league whose tensors these are, with the pool in ``folder``.
+
+    Raises:
+        OSError: a snapshot is not there.
+        ValueError: one is another than it was.
+    """
+    pool = []
+    for (epoch, island, wanted), record in zip(tensors["pool"].tolist(), tensors["pool_records"].tolist(), strict=True):
+        snapshot = opened(folder, epoch, island, Record(*record))
+        if snapshot.checksum != wanted:
+            raise ValueError(f"{file_name(epoch, island)} is not what it was")
+        pool.append(snapshot)
+    begun = zip(tensors["attempts"].tolist(), tensors["attempt_records"].tolist(), strict=True)
+    return LeagueState(tuple(pool), tuple(Attempt(island, epoch, Record(*record)) for (island, epoch), record in begun))
+
+
+def pruned(folder: Path, needed: Iterable[str]) -> None:
+    """Removes the files of ``folder`` that no checkpoint needs any more."""
+    if folder.is_dir():
+        for name in {path.name for path in folder.iterdir()} - set(needed):
+            (folder / name).unlink()
