@@ -24,7 +24,7 @@ from berteam_cli.training import Parts, Run
 
 log = logging.getLogger("berteam")
 
-SCHEMA = 5  # raised when a file of an older version could be misread
+SCHEMA = 6  # raised when a file of an older version could be misread
 KEPT = 2
 DAMAGES = (
     *(OSError, ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError),

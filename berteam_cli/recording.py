@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from berteam_cli.archiving import archive_of, archive_rows, cell_rows
 from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.learner.base import LEARNING_FIGURES
+from berteam_cli.optimizer.perturbing import reward_factors
 from berteam_cli.outcomes import SIDES, Outcomes
 from berteam_cli.population import island_of, names
-from berteam_cli.records import BY_SIDE_TABLE, COLUMNS, SIDES_TABLE, Tables, team_name, team_names
+from berteam_cli.records import ARCHIVE_TABLES, BY_SIDE_TABLE, COLUMNS, SIDES_TABLE, Tables, team_name, team_names
 from berteam_cli.selector.base import TeamDistribution, measured
 from berteam_cli.training import RECORDS, Clock, Parts, Report, Run, generator
 
@@ -23,7 +25,8 @@ Row = tuple[Any, ...]
 def also_growing(parts: Parts) -> list[str]:
     """Returns the tables that only runs of such ``parts`` have."""
     several, apart = parts.games.env.sides > 2, parts.selector.by_side
-    return [name for name, there in ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart)) if there]
+    found = [name for name, there in ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart)) if there]
+    return found if archive_of(parts) is None else [*found, *ARCHIVE_TABLES]
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,9 @@ class Recorder:
         self.tables.add("team_distribution", distribution_rows(run.epoch, distribution))
         if self.parts.selector.by_side:
             self.tables.add(BY_SIDE_TABLE, self.by_side_rows(run))
+        if archive_of(self.parts) is not None:
+            self.tables.add("archive", archive_rows(run, self.parts))
+            self.tables.add("archive_cells", cell_rows(run, self.parts))
         captains = self.parts.selector.captains(run.selection)
         self.tables.add("captain_distribution", ((run.epoch, n, chance) for n, chance in enumerate(captains)))
         islands = self.parts.optimizer.islands
@@ -108,11 +114,14 @@ class Recorder:
         people = run.population
         fitness = self.parts.optimizer.fitness.shown(people.fitness)
         called = names(self.parts.optimizer.islands, people)
+        aggression, advance, spread = people.behaviour.T
         for island in self.parts.optimizer.islands:
             for n in range(island.first, island.first + island.size):
                 yield (
                     *(run.epoch, n, called[n], island.name, island.learner.algorithm, fitness[n]),
-                    *(people.age[n], people.games[n], people.captain_games[n], people.parent[n], people.behaviour[n]),
+                    *(people.age[n], people.games[n], people.captain_games[n], people.parent[n], aggression[n]),
+                    *(*people.traits[n], reward_factors(self.parts.optimizer.terms, people.pay[n])),
+                    *(advance[n], spread[n]),
                 )
 
     def learning_rows(self, run: Run, report: Report) -> Iterator[Row]:
@@ -128,7 +137,7 @@ class Recorder:
             name = self.parts.optimizer.islands[x.island].name
             yield (
                 *(run.epoch, name, x.removed, x.parent, x.removed_fitness, x.parent_fitness),
-                *(x.removed_age, x.reason),
+                *(x.removed_age, x.reason, x.second_parent),
             )
 
 

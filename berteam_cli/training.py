@@ -18,7 +18,7 @@ from berteam_cli.outcomes import Ints, Outcomes
 from berteam_cli.population import Population, founded, policies
 from berteam_cli.selector.base import Answering, Selecting, Selector
 
-FOUNDING, EPOCHS, RECORDS, EVALUATION, PAYOFFS = range(5)  # what a stream of random numbers is for
+FOUNDING, EPOCHS, RECORDS, EVALUATION, PAYOFFS, ARCHIVE = range(6)  # what a stream of random numbers is for
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def generator(seed: int, purpose: int, epoch: int = 0) -> Generator:
 def begin(parts: Parts) -> Run:
     """Returns the run before its first epoch."""
     people, selection = generator(parts.seed, FOUNDING).spawn(2)
-    population = founded(parts.optimizer.islands, parts.optimizer.fitness.initial, people)
+    population = founded(parts.optimizer.islands, parts.optimizer.fitness.initial, people, len(parts.optimizer.terms))
     return Run(0, population, parts.selector.init(selection))
 
 
@@ -93,7 +93,7 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
 
     lineups = selector.select(run.selection, parts.games_per_epoch // rounds(selector), population.age, select)
     clock.lap("select_s")
-    acting = policies(optimizer.islands, population, explore=True)
+    acting = policies(optimizer.islands, population, explore=True)._replace(pay=population.pay)
     outcomes, experience = parts.games.play(acting, lineups, key(play), record=watched(parts), room=parts.room)
     if selector.answers:  # each opponent once more, with teams chosen on what was seen of it
         lineups = cast("Answering[Any]", selector).answer(run.selection, lineups, experience, population.age, select)

@@ -14,10 +14,10 @@ import numpy.typing as npt
 from berteam_cli.acting import FIXED, Policies, act
 from berteam_cli.env.base import Results
 from berteam_cli.errors import RunError
-from berteam_cli.outcomes import Floats, Ints
+from berteam_cli.outcomes import HABITS, Floats, Ints
 from mctf.compiled import kernel, part
 from mctf.draws import next_uniform
-from mctf.geometry import team_of
+from mctf.geometry import apart, is_right, team_of, vehicles_of
 from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIME_OUT, finished, step
 from mctf.observe import normalise, observe, ranges
 from mctf.rewards import TERMS, Reward, make_reward, rewards
@@ -52,6 +52,7 @@ class Mctf:
     actions: int = ACTIONS
     fixed_policies: tuple[str, ...] = field(default=FIXED_POLICIES)
     standard_policies: int = len(PAPER)
+    habits: tuple[str, ...] = HABITS
 
     def __init__(
         self, team_size: int, reward: str, reward_weights: Mapping[str, float | None] | None = None, **settings: Any
@@ -81,11 +82,15 @@ class Mctf:
         self, games: range, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results
     ) -> None:
         scratch = blank_scratch(self, policies)
-        play_games(
-            games.start, games.stop, players, policies, seeds, results, self.rules, self.reward, self.scale, scratch
-        )
+        reward = self.reward._replace(factors=scratch.factors)
+        play_games(games.start, games.stop, players, policies, seeds, results, self.rules, reward, self.scale, scratch)
         if self.reward.has_own and len(results.rewards):
             check_paid(games, seeds, results)
+
+    @property
+    def reward_weights(self) -> dict[str, float]:
+        """The weight of each term of the reward, besides what a function pays."""
+        return dict(zip(TERMS, self.reward.weights.tolist(), strict=True))
 
     def fingerprint(self) -> dict[str, object]:  # noqa: D102
         return {"env": "mctf", **self.rules._asdict()}
@@ -116,6 +121,7 @@ class Scratch(NamedTuple):
         paid: (V,).
         terms: (len(TERMS),).
         work: (2 * widest layer,) float32, for networks.
+        factors: (V, P) of the reward's weights, as of ``Policies.pay``.
     """
 
     state: State
@@ -126,6 +132,7 @@ class Scratch(NamedTuple):
     paid: Floats
     terms: Floats
     work: npt.NDArray[np.float32]
+    factors: Floats
 
 
 def blank_scratch(env: Mctf, policies: Policies) -> Scratch:
@@ -140,6 +147,7 @@ def blank_scratch(env: Mctf, policies: Policies) -> Scratch:
         paid=np.zeros(seen[0]),
         terms=np.zeros(len(TERMS)),
         work=np.zeros(2 * (policies.sizes.max() + 1), dtype=np.float32),
+        factors=np.ones((seen[0], policies.pay.shape[1])),
     )
 
 
@@ -166,7 +174,7 @@ def play_games(
         seeds: (B,) uint64.
         results: changed.
         rules: of the game.
-        reward: of learners.
+        reward: of learners, with the factors of ``scratch``.
         scale: (2, O) as of mctf.observe.ranges.
         scratch: changed.
     """
@@ -176,6 +184,9 @@ def play_games(
         state.stream[0] = seeds[b]
         forget(state, 0, rules)
         reset(state, 0, rules)
+        for v in range(scratch.factors.shape[0]):
+            for term in range(scratch.factors.shape[1]):
+                scratch.factors[v, term] = policies.pay[players[b, v], term]
         moment = 0
         look(state, scale, rules, raw, seen)
         while finished(state, 0, rules) == RUNNING:
@@ -186,6 +197,7 @@ def play_games(
                 for v in range(len(actions)):
                     results.actions[b, v, moment] = actions[v]
             step(state, 0, actions, rules)
+            watch(state, rules, results, b)
             if record and reward.has_own:
                 remember(raw, before)
             look(state, scale, rules, raw, seen)
@@ -245,8 +257,28 @@ def chosen(
 
 
 @part
+def watch(state: State, rules: Rules, results: Results, b: int) -> None:
+    """Adds where the vehicles of either side are after a step to the row ``b`` of the habits of ``results``."""
+    diagonal = math.sqrt(rules.width_m * rules.width_m + rules.height_m * rules.height_m)
+    for side in range(2):
+        first, last = vehicles_of(side, rules)
+        advance, spread = 0.0, 0.0
+        for v in range(first, last):
+            x, y = state.pos[0, v, 0], state.pos[0, v, 1]
+            advance += (rules.width_m - x if is_right(side, rules) else x) / rules.width_m
+            for mate in range(v + 1, last):
+                spread += apart(x, y, state.pos[0, mate, 0], state.pos[0, mate, 1]) / diagonal
+        size = last - first
+        results.habits[b, side, 0] += advance / size
+        results.habits[b, side, 1] += spread / max(size * (size - 1) // 2, 1)
+
+
+@part
 def settle(state: State, rules: Rules, b: int, results: Results) -> None:
-    """Writes scores and events of the finished game to row ``b`` of ``results``; more captures win on time."""
+    """Writes scores, events and habits of the finished game to row ``b`` of ``results``; more captures win on time."""
+    for side in range(2):
+        for habit in range(len(HABITS)):
+            results.habits[b, side, habit] /= max(results.steps[b], 1)
     end = finished(state, 0, rules)
     gap = state.score[0, 0, CAPTURES] - state.score[0, 1, CAPTURES]
     if end != TIME_OUT:

@@ -96,11 +96,13 @@ class Reward(NamedTuple):
         weights: (len(TERMS),).
         has_own: whether ``own`` is called.
         own: compiled; takes (len(TERMS),), and (O,) twice: the unnormalised observation before and after the step.
+        factors: (V, len(TERMS)) by what the weights are multiplied for each vehicle; none, (0, 0), for all alike.
     """
 
     weights: NDArray[np.float64]
     has_own: bool
     own: Any
+    factors: NDArray[np.float64] = np.zeros((0, 0))
 
 
 def progress(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
@@ -219,10 +221,17 @@ def rewards(
         happened(state, b, v, rules, terms)
         total = 0.0
         for term in range(len(TERMS)):
-            total += reward.weights[term] * terms[term]
+            total += weight_of(reward, v, term) * terms[term]
         if reward.has_own:
             total += reward.own(terms, before[v], after[v])
         out[v] = total
+
+
+@part
+def weight_of(reward: Reward, v: int, term: int) -> float:
+    """Returns the weight of a term for vehicle ``v``."""
+    weight = reward.weights[term]
+    return weight * reward.factors[v, term] if reward.factors.shape[1] > 0 else weight
 
 
 @part
