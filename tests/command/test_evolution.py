@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+from stable_baselines3 import PPO
 
 from berteam_cli import build
 from berteam_cli.config import checked
@@ -57,6 +58,10 @@ def test_evolving_runs_are_the_same_whoever_plays_and_wherever_they_were_cut(ber
     np.testing.assert_allclose(powers, powers.round(), atol=1e-6)
     assert (powers[ended.parent >= 0].round() != 0).any()
     assert (ended.entropy_coef.isna() == ended.algorithm.eq("dqn")).all()
+    child = children[children.algorithm == "ppo"].iloc[-1]
+    berteam("export", "whole", f"agent={child.agent}", "out=child.zip")
+    model = PPO.load(tmp_path / "child.zip")
+    assert (model.learning_rate, model.gamma) == (child.learning_rate, child.gamma)
     check_archive(tmp_path / "whole", ended)
     said = berteam("report", "whole").stdout
     assert "archive.png" in said
@@ -85,13 +90,13 @@ def check_archive(folder, ended):
         np.testing.assert_array_equal(full.fitness, best)
 
 
-PPO = ("population=ppo6",)
+SIX = ("population=ppo6",)
 RPS = ("env=rps", "population=ppo6")
-ELITES = (*PPO, "optimizer=mapelites")
+ELITES = (*SIX, "optimizer=mapelites")
 WRONG = {
-    (*PPO, "optimizer.perturb.gamma=0.9"): "optimizer.perturb.gamma must be >= 1 and <= 100, but is 0.9",
-    (*PPO, "optimizer.mutation=-1"): "optimizer.mutation must be >= 0",
-    (*PPO, "optimizer.crossover=1.1"): "optimizer.crossover must be >= 0 and <= 1",
+    (*SIX, "optimizer.perturb.gamma=0.9"): "optimizer.perturb.gamma must be >= 1 and <= 100, but is 0.9",
+    (*SIX, "optimizer.mutation=-1"): "optimizer.mutation must be >= 0",
+    (*SIX, "optimizer.crossover=1.1"): "optimizer.crossover must be >= 0 and <= 1",
     (
         *PPO,
         "optimizer.perturb.entropy_coef=2",
@@ -99,9 +104,9 @@ WRONG = {
     ("population=ppo6", "learner=dqn", "optimizer.perturb.entropy_coef=2"): "unless an island has learner=ppo,",
     ("population=fixed_policies", "optimizer.perturb.gamma=2"): "unless an island has learner=ppo or learner=dqn,",
     ("population=fixed_policies", "optimizer.mutation=0.1"): r"optimizer.mutation must be 0 .*\(fixed\)",
-    (*PPO, "learner=sb3", "optimizer.crossover=0.1"): r"optimizer.crossover must be 0 .*\(A2C\)",
+    (*SIX, "learner=sb3", "optimizer.crossover=0.1"): r"optimizer.crossover must be 0 .*\(A2C\)",
     (*RPS, "optimizer.perturb.reward=2"): "optimizer.perturb.reward must be 1 where the reward has no weights",
-    (*PPO, "env.reward=custom_rew", "optimizer.perturb.reward=2"): "optimizer.perturb.reward must be 1",
+    (*SIX, "env.reward=custom_rew", "optimizer.perturb.reward=2"): "optimizer.perturb.reward must be 1",
     (
         *RPS,
         "optimizer=mapelites",
