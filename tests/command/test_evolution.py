@@ -98,7 +98,7 @@ WRONG = {
     (*SIX, "optimizer.mutation=-1"): "optimizer.mutation must be >= 0",
     (*SIX, "optimizer.crossover=1.1"): "optimizer.crossover must be >= 0 and <= 1",
     (
-        *PPO,
+        *SIX,
         "optimizer.perturb.entropy_coef=2",
     ): "optimizer.perturb.entropy_coef must be 1 while learner.entropy_coef is 0",
     ("population=ppo6", "learner=dqn", "optimizer.perturb.entropy_coef=2"): "unless an island has learner=ppo,",
