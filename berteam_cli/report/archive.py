@@ -22,7 +22,10 @@ def cells(source: Source) -> Plot | None:
     table = source.table("archive_cells")
     if table is None:
         return None
+    name, title = "archive", "The fittest of each behaviour"
     last = table[table.epoch == table.epoch.max()]
+    if last.fitness.isna().all():
+        return Plot(name, title, "No member was measured yet: MAP-Elites begins when one is older than protect_new.")
     axes = [name for name in BEHAVIOURS if last[name].notna().any()][:2]
     best = last.groupby(axes, as_index=False).fitness.max()  # over islands, and over a third behaviour
     figure, (plot,) = panels(height_in=1.6 if len(axes) == 1 else 3.7)
@@ -42,7 +45,7 @@ def cells(source: Source) -> Plot | None:
     if last[list(BEHAVIOURS)].notna().any().sum() > 2:
         says += " A third behaviour is left out: of its cells the fittest is shown."
     alt = f"Map of {len(best)} cells by {' and '.join(axes)}, {known} of them with a member."
-    return drawn(figure, "archive", "The fittest of each behaviour", says, alt)
+    return drawn(figure, name, title, says, alt)
 
 
 def strip(plot: Axes, centres: Floats, fitness: Floats) -> Any:

@@ -43,6 +43,12 @@ def test_cells_of_any_kind_are_drawn(rows, said, tmp_path):
     assert "<svg" in plot.svg
 
 
+def test_an_empty_archive_is_told_in_words(tmp_path):
+    plot = plotted(tmp_path, GRID)
+    assert not plot.svg
+    assert "No member was measured" in plot.says
+
+
 def test_borders_are_half_the_way():
     np.testing.assert_allclose(borders(np.array([1.0, 3.0, 4.0])), [0, 2, 3.5, 4.5])
     np.testing.assert_allclose(borders(np.array([2.0])), [1.5, 2.5])
