@@ -28,6 +28,8 @@ class Policies(NamedTuple):
         tanh: (K,) bool, whether hidden layers use tanh, else ReLU.
         epsilon: (K,) float32, chance of a uniformly random action instead of the policy's own.
         weights: (K, W) float32, for each layer its matrix (in, out) row by row, then its bias; zeros behind.
+        pay: (K, P) float64, by what the weight of each term of the game's reward is multiplied for who acts so; P = 0
+            where all are paid alike.
     """
 
     kind: npt.NDArray[np.int8]
@@ -36,6 +38,7 @@ class Policies(NamedTuple):
     tanh: npt.NDArray[np.bool_]
     epsilon: npt.NDArray[np.float32]
     weights: npt.NDArray[np.float32]
+    pay: npt.NDArray[np.float64]
 
 
 def fixed_policies(indices: npt.ArrayLike) -> Policies:
@@ -48,6 +51,7 @@ def fixed_policies(indices: npt.ArrayLike) -> Policies:
         tanh=np.zeros(len(fixed), dtype=np.bool_),
         epsilon=np.zeros(len(fixed), dtype=np.float32),
         weights=np.zeros((len(fixed), 0), dtype=np.float32),
+        pay=np.zeros((len(fixed), 0)),
     )
 
 
@@ -78,15 +82,17 @@ def networks(
         tanh=np.full(members, tanh, dtype=np.bool_),
         epsilon=np.broadcast_to(np.asarray(epsilon, dtype=np.float32), (members,)).copy(),
         weights=np.ascontiguousarray(np.concatenate(flat, axis=1), dtype=np.float32),
+        pay=np.zeros((members, 0)),
     )
 
 
 def joined(tables: list[Policies]) -> Policies:
-    """Returns the rows of all ``tables``, one table after the other."""
-    widest = max(table.weights.shape[1] for table in tables)
+    """Returns the rows of all ``tables``, one table after the other; a table without factors of pay gets ones."""
+    widest, factors = max(t.weights.shape[1] for t in tables), max(t.pay.shape[1] for t in tables)
     weights = [np.pad(t.weights, ((0, 0), (0, widest - t.weights.shape[1]))) for t in tables]
-    columns = [np.concatenate(column) for column in zip(*(t[:-1] for t in tables), strict=True)]
-    return Policies._make((*columns, np.concatenate(weights)))
+    pay = [np.pad(t.pay, ((0, 0), (0, factors - t.pay.shape[1])), constant_values=1.0) for t in tables]
+    columns = [np.concatenate(column) for column in zip(*(t[:-2] for t in tables), strict=True)]
+    return Policies._make((*columns, np.concatenate(weights), np.concatenate(pay)))
 
 
 def noisy(policies: Policies, chance: float) -> Policies:

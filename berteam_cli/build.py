@@ -19,6 +19,7 @@ from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.env.rps import Rps
 from berteam_cli.errors import InputError
+from berteam_cli.evolving import breeding, niches
 from berteam_cli.founding import archipelago, check_policies
 from berteam_cli.games import Games
 from berteam_cli.memory import check_memory
@@ -263,6 +264,9 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
         settings.pop(used)
     if chosen.learns:
         settings["workers"] = playing.workers
+        settings["breeding"] = breeding(settings, islands, playing.env)
+    if "behaviours" in settings:
+        settings |= niches(settings, config.team_size, playing.env, config.seed)
     if "opponents" in settings:
         names = settings["opponents"] or list(playing.env.fixed_policies[: playing.env.standard_policies])
         check_policies(names, playing.env, "optimizer.opponents, or optimizer.opponents=[] for the standard ones,")

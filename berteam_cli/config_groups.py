@@ -38,6 +38,7 @@ class RewardWeightsConfig:
     won: float | None = MISSING
     lost: float | None = MISSING
     drawn: float | None = MISSING
+    step: float | None = MISSING
 
 
 @dataclass
@@ -249,6 +250,16 @@ class FixedOptimizerConfig(OptimizerConfig):
 
 
 @dataclass
+class PerturbConfig:
+    """Factors of optimizer/perturbing.py; 1 moves nothing."""
+
+    learning_rate: float = number(1, 100)
+    entropy_coef: float = number(1, 100)
+    gamma: float = number(1, 100)
+    reward: float = number(1, 100)
+
+
+@dataclass
 class CoevolutionConfig(OptimizerConfig):
     """Settings of optimizer/coevolution.py."""
 
@@ -256,6 +267,36 @@ class CoevolutionConfig(OptimizerConfig):
     elites: int = number()
     protect_new: int = number()
     draw_protected: bool = MISSING
+    perturb: PerturbConfig = MISSING
+    mutation: float = number(0, 10)
+    crossover: float = number(0, 1)
+
+
+@dataclass
+class BehaviourScalesConfig:
+    """By what each of outcomes.BEHAVIOURS is divided before distances are taken."""
+
+    aggression: float = number(open_low=True)
+    advance: float = number(open_low=True)
+    spread: float = number(open_low=True)
+
+
+@dataclass
+class ArchiveBinsConfig:
+    """Cells of a grid along each of outcomes.BEHAVIOURS."""
+
+    aggression: int = number(1, 1000)
+    advance: int = number(1, 1000)
+    spread: int = number(1, 1000)
+
+
+@dataclass
+class ArchiveRangesConfig:
+    """Lowest and highest of each of outcomes.BEHAVIOURS that an archive tells apart."""
+
+    aggression: list[float] = MISSING
+    advance: list[float] = MISSING
+    spread: list[float] = MISSING
 
 
 @dataclass
@@ -267,6 +308,12 @@ class MapElitesConfig(CoevolutionConfig):
     probe_games: int = number(1)
     project_every: int = number(1)
     lambda_growth: float = number(1, 100)
+    behaviours: list[str] = MISSING
+    behaviour_scales: BehaviourScalesConfig = MISSING
+    archive: str = choice("none", "grid", "cvt")
+    archive_bins: ArchiveBinsConfig = MISSING
+    archive_ranges: ArchiveRangesConfig = MISSING
+    archive_cells: int = number(1, 1000)
 
 
 @dataclass

@@ -8,11 +8,13 @@ import numpy as np
 
 from berteam_cli.acting import DEEPEST, FIXED, GREEDY, SAMPLED, Policies
 from berteam_cli.env.base import Env
-from berteam_cli.outcomes import OPEN
+from berteam_cli.learner.traits import TRAITS
+from berteam_cli.outcomes import BEHAVIOURS, OPEN
 from berteam_cli.population import ARRAYS, policies
 from berteam_cli.training import Parts, Run
 
-KINDS = dict.fromkeys(ARRAYS, np.int64) | {"fitness": np.float64, "behaviour": np.float64, "stale": np.bool_}
+FLOATS = ("fitness", "behaviour", "traits", "pay")
+KINDS = dict.fromkeys(ARRAYS, np.int64) | {"stale": np.bool_} | dict.fromkeys(FLOATS, np.float64)
 MEMBERS = ("teams", "found", "candidates", "choice")
 """Last words of the names of a selector's tensors that hold members."""
 
@@ -42,9 +44,10 @@ def check_run(run: Run, parts: Parts) -> None:
     for island, mind in zip(islands, run.population.minds, strict=True):
         if len(island.learner.names(mind, island.name)) != island.size:
             raise ValueError(f"its island {island.name} has not {island.size} members")
+    axes = {"behaviour": (len(BEHAVIOURS),), "traits": (len(TRAITS),), "pay": (len(parts.optimizer.terms),)}
     for name, kind in KINDS.items():
         array = getattr(run.population, name)
-        if array.dtype != kind or array.shape != (members,):
+        if array.dtype != kind or array.shape != (members, *axes.get(name, ())):
             raise ValueError(f"its {name} are not of {members} members: {array.dtype} of shape {array.shape}")
     check_policies(policies(islands, run.population, explore=False), parts.games.env)
     for snapshot in run.league.pool if run.league else ():
@@ -66,7 +69,7 @@ def check_policies(table: Policies, game: Env) -> None:
     """
     rows, sizes = len(table.kind), table.sizes.astype(np.int64)
     shapes = [column.shape for column in table]
-    if shapes != [(rows,), (rows,), (rows, DEEPEST + 2), (rows,), (rows,), (rows, *shapes[-1][1:])]:
+    if shapes != [(rows,), (rows,), (rows, DEEPEST + 2), (rows,), (rows,), (rows, *shapes[-2][1:]), (rows, 0)]:
         raise ValueError("its policies are not as many everywhere")
     fixed, network = table.kind == FIXED, np.isin(table.kind, (SAMPLED, GREEDY))
     widths = sizes[np.arange(rows), np.maximum((sizes > 0).sum(axis=1) - 1, 0)]  # of the last layers

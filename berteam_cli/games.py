@@ -78,7 +78,7 @@ class Games:
             if isinstance(self.env, Stoppable):
                 self.env.stop()
             raise
-        outcomes = Outcomes(lineups, results.scores, results.steps, results.events, seeds)
+        outcomes = Outcomes(lineups, results.scores, results.steps, results.events, seeds, results.habits)
         return outcomes, experience_of(players, results)
 
     def play_here(self, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results) -> None:
@@ -159,6 +159,7 @@ def as_side_0(outcomes: Outcomes, each: int) -> Outcomes:
         outcomes.steps,
         outcomes.events[row, order],
         outcomes.seeds,
+        None if outcomes.habits is None else outcomes.habits[row, order],
     )
 
 

@@ -25,6 +25,14 @@ NOBODY = -1  # no captain, no parent
 SIDES = ("blue", "red", "green", "gold", "purple", "orange", "cyan", "pink")  # what the tables call them
 
 EVENTS = ("captures", "grabs", "tags", "wall_hits")  # what a game counts for each side
+HABITS = ("advance", "spread")
+"""What a game with positions measures of each side, means over its steps and vehicles.
+
+advance: where a vehicle is along the field, 0 at its own back wall and 1 at the opponents'. spread: the distance
+between two team-mates as a share of the field's diagonal; 0 for who has none.
+"""
+BEHAVIOURS = ("aggression", *HABITS)
+"""What is measured of members in probing games. Shape letter D: how many there are."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +68,7 @@ class Outcomes:
         steps: (B,) length of each game.
         events: (B, S, len(EVENTS)) counts.
         seeds: (B,) uint64, the stream each game drew from.
+        habits: (B, S, len(HABITS)), zeros in a game without positions; None where they were not kept.
     """
 
     lineups: Lineups
@@ -67,6 +76,7 @@ class Outcomes:
     steps: Ints
     events: Ints
     seeds: npt.NDArray[np.uint64]
+    habits: Floats | None = None
 
     @property
     def winners(self) -> Ints:

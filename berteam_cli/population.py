@@ -10,7 +10,8 @@ from numpy.random import Generator
 
 from berteam_cli.acting import Policies, joined
 from berteam_cli.learner.base import Learner
-from berteam_cli.outcomes import NOBODY, Bools, Floats, Ints, Outcomes
+from berteam_cli.learner.traits import traits_of
+from berteam_cli.outcomes import BEHAVIOURS, NOBODY, Bools, Floats, Ints, Outcomes
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,12 @@ class Population:
         games: (N,) games played since then, a game on several sides counted for each.
         captain_games: (N,) of them as captain.
         parent: (N,) whose copy the member is, NOBODY for those of the beginning.
-        behaviour: (N,) aggression as last measured, NaN before.
+        behaviour: (N, D) BEHAVIOURS as last measured, NaN before.
         stale: (N,) whether the member's policy changed since its behaviour was measured.
         failed: (N,) epochs in a row in which all its updates were undone, since they gave something not finite.
+        traits: (N, H) the member's own settings, of TRAITS; NaN where its learner has none.
+        pay: (N, P) by what the weight of each term of the game's reward is multiplied for it; P = 0 where all are paid
+            alike.
     """
 
     minds: tuple[Any, ...]
@@ -62,6 +66,8 @@ class Population:
     behaviour: Floats
     stale: Bools
     failed: Ints
+    traits: Floats
+    pay: Floats
 
     @property
     def size(self) -> int:
@@ -69,11 +75,18 @@ class Population:
         return len(self.fitness)
 
 
-ARRAYS = ("fitness", "age", "games", "captain_games", "parent", "behaviour", "stale", "failed")
+ARRAYS = ("fitness", "age", "games", "captain_games", "parent", "behaviour", "stale", "failed", "traits", "pay")
 
 
-def founded(islands: tuple[Island, ...], fitness: float, rng: Generator) -> Population:
-    """Returns the population before the first epoch, everyone with the same ``fitness``."""
+def founded(islands: tuple[Island, ...], fitness: float, rng: Generator, terms: int = 0) -> Population:
+    """Returns the population before the first epoch, everyone with the same ``fitness``.
+
+    Args:
+        islands: of the population.
+        fitness: of everyone.
+        rng: where weights are drawn from.
+        terms: P, for how many terms of the reward members have factors of their own.
+    """
     members = sum(island.size for island in islands)
     streams = rng.spawn(len(islands))
     return Population(
@@ -83,9 +96,11 @@ def founded(islands: tuple[Island, ...], fitness: float, rng: Generator) -> Popu
         games=np.zeros(members, dtype=np.int64),
         captain_games=np.zeros(members, dtype=np.int64),
         parent=np.full(members, NOBODY, dtype=np.int64),
-        behaviour=np.full(members, np.nan),
+        behaviour=np.full((members, len(BEHAVIOURS)), np.nan),
         stale=np.ones(members, dtype=np.bool_),
         failed=np.zeros(members, dtype=np.int64),
+        traits=np.repeat([traits_of(i.learner) for i in islands], [i.size for i in islands], axis=0),
+        pay=np.ones((members, terms)),
     )
 
 

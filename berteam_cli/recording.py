@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from berteam_cli.archiving import archive_of, archive_rows, cell_rows
 from berteam_cli.evaluation.exploiting import Exploiting
 from berteam_cli.evaluation.sight import Sight
 from berteam_cli.evaluation.watching import Watching
 from berteam_cli.learner.base import LEARNING_FIGURES
 from berteam_cli.opponents.base import Guest, Met, Opponents
+from berteam_cli.optimizer.perturbing import reward_factors
 from berteam_cli.outcomes import NOBODY, SIDES, Outcomes
 from berteam_cli.population import island_of, names
 from berteam_cli.records import (
+    ARCHIVE_TABLES,
     BY_SIDE_TABLE,
     COLUMNS,
     OPPONENTS_TABLE,
@@ -36,7 +39,8 @@ def also_growing(parts: Parts, *, watched: bool) -> list[str]:
     """Returns the tables that only runs of such ``parts`` have, or such as are ``watched`` while they go on."""
     several, apart, met = parts.games.env.sides > 2, parts.selector.by_side, parts.opponents.games > 0
     asked = ((SIDES_TABLE, several), (BY_SIDE_TABLE, apart), (WATCHED_TABLE, watched), (OPPONENTS_TABLE, met))
-    return [name for name, there in asked if there]
+    found = [name for name, there in asked if there]
+    return found if archive_of(parts) is None else [*found, *ARCHIVE_TABLES]
 
 
 @dataclass(frozen=True)
@@ -118,6 +122,9 @@ class Recorder:
         self.tables.add("team_distribution", distribution_rows(run.epoch, distribution))
         if self.parts.selector.by_side:
             self.tables.add(BY_SIDE_TABLE, self.by_side_rows(run))
+        if archive_of(self.parts) is not None:
+            self.tables.add("archive", archive_rows(run, self.parts))
+            self.tables.add("archive_cells", cell_rows(run, self.parts))
         captains = self.parts.selector.captains(run.selection)
         self.tables.add("captain_distribution", ((run.epoch, n, chance) for n, chance in enumerate(captains)))
         islands = self.parts.optimizer.islands
@@ -140,11 +147,14 @@ class Recorder:
         people = run.population
         fitness = self.parts.optimizer.fitness.shown(people.fitness)
         called = names(self.parts.optimizer.islands, people)
+        aggression, advance, spread = people.behaviour.T
         for island in self.parts.optimizer.islands:
             for n in range(island.first, island.first + island.size):
                 yield (
                     *(run.epoch, n, called[n], island.name, island.learner.algorithm, fitness[n]),
-                    *(people.age[n], people.games[n], people.captain_games[n], people.parent[n], people.behaviour[n]),
+                    *(people.age[n], people.games[n], people.captain_games[n], people.parent[n], aggression[n]),
+                    *(*people.traits[n], reward_factors(self.parts.optimizer.terms, people.pay[n])),
+                    *(advance[n], spread[n]),
                 )
 
     def learning_rows(self, run: Run, report: Report) -> Iterator[Row]:
@@ -160,7 +170,7 @@ class Recorder:
             name = self.parts.optimizer.islands[x.island].name
             yield (
                 *(run.epoch, name, x.removed, x.parent, x.removed_fitness, x.parent_fitness),
-                *(x.removed_age, x.reason),
+                *(x.removed_age, x.reason, x.second_parent),
             )
 
 

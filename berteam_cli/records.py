@@ -24,7 +24,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     ),
     "agents": (
         *("epoch", "agent", "name", "island", "algorithm", "fitness", "age", "games", "captain_games", "parent"),
-        "aggression",
+        *("aggression", "learning_rate", "entropy_coef", "gamma", "reward_factors", "advance", "spread"),
     ),
     "team_distribution": ("epoch", "team", "probability", "error"),
     "side_distribution": ("epoch", "side", "team", "probability", "error"),
@@ -38,6 +38,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "sides": ("epoch", "game", "side", "team", "captain", "score"),
     "generations": (
         *("epoch", "island", "removed", "parent", "removed_fitness", "parent_fitness", "removed_age", "reason"),
+        "second_parent",
     ),
     "learning": ("epoch", "agent", "algorithm", *LEARNING_FIGURES),
     "selector": ("epoch", "loss", "updates", "buffer", "effective_teams", "entropy", "exploitability", "skipped"),
@@ -88,6 +89,8 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "figures": ("epoch", "quantity", "value", "low", "high", "team"),
     "calibration": ("epoch", "decile", "teams", "predicted_elo", "elo", "low", "high"),
     "embeddings": ("epoch", "group", "members", "pairs", "cosine", "above_all"),
+    "archive": ("epoch", "island", "cells", "occupied", "coverage", "qd_score", "best_fitness"),
+    "archive_cells": ("epoch", "island", "cell", "aggression", "advance", "spread", "member", "fitness"),
     "neighbours": ("epoch", "agent", "name", "rank", "neighbour", "neighbour_name", "cosine"),
     "evaluation": (
         *("epoch", "who", "opponent", "games", "wins", "draws", "losses"),
@@ -107,6 +110,7 @@ SIDES_TABLE = "sides"  # grows too, in games of more than two sides, whose row i
 OPPONENTS_TABLE = "opponents"  # grows too, where others than the population's teams are met
 BY_SIDE_TABLE = "side_distribution"  # grows too, where a team's chance depends on the side it plays
 WATCHED_TABLE = "evaluation"  # grows too, where the run is looked at while it goes on (evaluate_every)
+ARCHIVE_TABLES = ("archive", "archive_cells")  # grow too, where optimizer.archive keeps members apart
 EVALUATION = "evaluation"
 """The folder in a run's, where `berteam evaluate` writes."""
 SHEETS = ("played", "members", "replayed", "payoffs", "encounters")

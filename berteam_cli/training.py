@@ -20,7 +20,7 @@ from berteam_cli.outcomes import Ints, Lineups, Outcomes
 from berteam_cli.population import Population, founded, policies
 from berteam_cli.selector.base import Answering, Selecting, Selector
 
-FOUNDING, EPOCHS, RECORDS, EVALUATION, PAYOFFS, WATCHED = range(6)  # what a stream of random numbers is for
+FOUNDING, EPOCHS, RECORDS, EVALUATION, PAYOFFS, WATCHED, ARCHIVE = range(7)  # what a stream of random numbers is for
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def generator(seed: int, purpose: int, epoch: int = 0) -> Generator:
 def begin(parts: Parts) -> Run:
     """Returns the run before its first epoch."""
     people, selection = generator(parts.seed, FOUNDING).spawn(2)
-    population = founded(parts.optimizer.islands, parts.optimizer.fitness.initial, people)
+    population = founded(parts.optimizer.islands, parts.optimizer.fitness.initial, people, len(parts.optimizer.terms))
     return Run(0, population, parts.selector.init(selection), league=parts.opponents.begun(population))
 
 
@@ -106,7 +106,8 @@ def epoch(run: Run, parts: Parts) -> tuple[Run, Report]:
     lineups = choose((parts.games_per_epoch - opponents.games) // rounds(selector), select)
     guests = opponents.invited(run.league, population.size, choose, meet)
     clock.lap("select_s")
-    acting = joined([policies(optimizer.islands, population, explore=True), guests.policies])
+    members = policies(optimizer.islands, population, explore=True)._replace(pay=population.pay)
+    acting = joined([members, guests.policies])
     practice, all_games = parts.curriculum.practice(parts.games, run.epoch), lineups.followed_by(guests.lineups)
     played, lived = practice.play(acting, all_games, key(play), record=watched(parts), room=parts.room)
     outcomes, met = played.of(slice(len(lineups))), Met(guests.teams, played.of(slice(len(lineups), None)))

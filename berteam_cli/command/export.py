@@ -12,6 +12,7 @@ from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.folder import write_whole
 from berteam_cli.learner.exporting import exported
+from berteam_cli.learner.traits import Tunable, tuned
 from berteam_cli.population import island_of, names
 from berteam_cli.quiet import written
 from berteam_cli.reading import last_state
@@ -40,9 +41,11 @@ def export(folder: Path, overrides: list[str]) -> Path:
     path = place(folder, agent, given)
     home = int(island_of(islands)[agent])
     island, called = islands[home], names(islands, run.population)[agent]
-    space = observation_space(parts.games.env)
+    space, row, learner = observation_space(parts.games.env), agent - island.first, island.learner
+    if isinstance(learner, Tunable):
+        learner = tuned(learner, run.population.traits[island.members], row)
     try:
-        model = exported(island.learner, run.population.minds[home], agent - island.first, space)
+        model = exported(learner, run.population.minds[home], row, space)
     except ValueError as error:
         raise InputError(f"agent={agent} ({called}) cannot be exported: {error}.") from error
     steps = parts.games.env.last_steps if isinstance(parts.games.env, Mctf) else 1

@@ -23,7 +23,7 @@ from berteam_cli.trust import told
 WHOLE = {"team": str, "blue": str, "red": str, "best_team": str, "opponent": str}  # 3 is a team, not a number
 TEXT = {
     *(*WHOLE, "members", "name", "island", "algorithm", "side", "reason", "cycle", "decision", "run", "quantity"),
-    *("source", "choice", "kind", "group", "neighbour_name", "who"),
+    *("source", "choice", "kind", "group", "neighbour_name", "who", "reward_factors"),
 }
 """Columns of words; all others are numbers."""
 
@@ -155,7 +155,8 @@ def show(folder: Path, top: int) -> None:
         out.print(printed(f"Most probable teams after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))
     if agents is not None and len(agents):
         last = agents[agents.epoch == agents.epoch.max()].sort_values("fitness", ascending=False, kind="stable")
-        out.print(printed(f"Fittest members after epoch {last.epoch.iloc[0]}", last.iloc[:top, 1:]))
+        members = last.loc[:, "agent":"aggression"].head(top)
+        out.print(printed(f"Fittest members after epoch {last.epoch.iloc[0]}", members))
     files = sorted(path.name for path in folder.iterdir() if path.suffix in {".csv", ".json", ".yaml", ".txt"})
     end(folder, files, *next_commands(folder, manifest["status"]))
 

@@ -10,7 +10,7 @@ from berteam_cli.config_commands import ReportConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import new_folder, write_whole
 from berteam_cli.quiet import written
-from berteam_cli.report import chosen, course, members, opponents, overview, page, strength, watched
+from berteam_cli.report import archive, chosen, course, members, opponents, overview, page, strength, watched
 from berteam_cli.report.drawing import Plot, check_matplotlib, styled
 from berteam_cli.report.film import best_game
 from berteam_cli.report.page import Report, Section
@@ -21,7 +21,7 @@ from berteam_cli.trust import trusted
 PAGE = "report.html"
 PLOTS = (
     *(strength.elos, chosen.teams, strength.against_probability, chosen.captains, chosen.islands, members.fitness),
-    *(members.aggression, members.embeddings, strength.crosstable, watched.elos, watched.results),
+    *(members.aggression, archive.cells, members.embeddings, strength.crosstable, watched.elos, watched.results),
     *(opponents.past, course.learning, course.selecting, course.timing),
 )
 

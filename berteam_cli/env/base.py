@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from berteam_cli.acting import Policies
-from berteam_cli.outcomes import EVENTS, Bools, Floats, Ints
+from berteam_cli.outcomes import EVENTS, HABITS, Bools, Floats, Ints
 
 
 class Results(NamedTuple):
     """Where games write what came of them; row b belongs to game b alone.
 
-    The last five have no rows where nobody is to learn from the games.
+    From ``observations`` to ``ended`` there are no rows where nobody is to learn from the games.
 
     Attributes:
         scores: (B, S).
@@ -26,6 +26,7 @@ class Results(NamedTuple):
         rewards: (B, V, L) float32.
         lengths: (B, V) steps of each player, of a kind of game that players may leave before its end; else zeros.
         ended: (B, V) whether the rules ended such a game for the player.
+        habits: (B, S, len(HABITS)); zeros of a game without positions.
     """
 
     scores: Floats
@@ -37,6 +38,7 @@ class Results(NamedTuple):
     rewards: npt.NDArray[np.float32]
     lengths: Ints
     ended: Bools
+    habits: Floats
 
 
 class Env(Protocol):
@@ -104,6 +106,24 @@ class Stoppable(Protocol):
         """Ends games that other threads play, since nobody waits for them any more; no more can be played."""
 
 
+@runtime_checkable
+class Weighing(Protocol):
+    """A kind of game that pays a player by weighted terms, which ``Policies.pay`` multiplies."""
+
+    @property
+    def reward_weights(self) -> dict[str, float]:
+        """The weight of each term, in the order of the columns of ``Policies.pay``."""
+
+
+@runtime_checkable
+class Spatial(Protocol):
+    """A kind of game with positions."""
+
+    @property
+    def habits(self) -> tuple[str, ...]:
+        """Which of HABITS it measures."""
+
+
 class Trajectories(NamedTuple):
     """Room for what the players of a batch of games see and do; fields as of Results."""
 
@@ -141,4 +161,5 @@ def blank_results(env: Env, games: int, *, record: bool, room: Trajectories | No
         np.zeros((games, env.sides, len(EVENTS)), dtype=np.int64),
         np.zeros(games, dtype=np.bool_),
         *trajectories,
+        np.zeros((games, env.sides, len(HABITS))),
     )

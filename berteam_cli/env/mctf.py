@@ -14,10 +14,10 @@ import numpy.typing as npt
 from berteam_cli.acting import FIXED, Policies, act
 from berteam_cli.env.base import Results
 from berteam_cli.errors import RunError
-from berteam_cli.outcomes import Floats, Ints
+from berteam_cli.outcomes import HABITS, Floats, Ints
 from mctf.compiled import kernel, part
 from mctf.draws import next_uniform
-from mctf.geometry import team_of
+from mctf.geometry import apart, is_right, team_of, vehicles_of
 from mctf.kernel import RUNNING, TIME_OUT, finished, lead, step
 from mctf.observe import normalise, observe, ranges
 from mctf.practice import BY_THE_RULES, Starts, practise
@@ -60,6 +60,7 @@ class Mctf:
     fixed_policies: tuple[str, ...] = field(default=FIXED_POLICIES)
     standard_policies: int = len(PAPER)
     starts: Starts = BY_THE_RULES
+    habits: tuple[str, ...] = HABITS
 
     def __init__(
         self,
@@ -105,9 +106,15 @@ class Mctf:
         self, games: range, players: Ints, policies: Policies, seeds: npt.NDArray[np.uint64], results: Results
     ) -> None:
         span, scratch = (games.start, games.stop), blank_scratch(self, policies)
-        play_games(*span, players, policies, seeds, results, self.rules, self.reward, self.scale, self.starts, scratch)
+        reward = self.reward._replace(factors=scratch.factors)
+        play_games(*span, players, policies, seeds, results, self.rules, reward, self.scale, self.starts, scratch)
         if self.reward.has_own and len(results.rewards):
             check_paid(games, seeds, results)
+
+    @property
+    def reward_weights(self) -> dict[str, float]:
+        """The weight of each term of the reward, besides what a function pays."""
+        return dict(zip(TERMS, self.reward.weights.tolist(), strict=True))
 
     def fingerprint(self) -> dict[str, object]:  # noqa: D102
         return {"env": "mctf", **self.rules._asdict()}
@@ -138,6 +145,7 @@ class Scratch(NamedTuple):
         paid: (V,).
         terms: (len(TERMS),).
         work: (2 * widest layer,) float32, for networks.
+        factors: (V, P) of the reward's weights, as of ``Policies.pay``.
     """
 
     state: State
@@ -148,6 +156,7 @@ class Scratch(NamedTuple):
     paid: Floats
     terms: Floats
     work: npt.NDArray[np.float32]
+    factors: Floats
 
 
 def blank_scratch(env: Mctf, policies: Policies) -> Scratch:
@@ -162,6 +171,7 @@ def blank_scratch(env: Mctf, policies: Policies) -> Scratch:
         paid=np.zeros(vehicles),
         terms=np.zeros(len(TERMS)),
         work=np.zeros(2 * (policies.sizes.max() + 1), dtype=np.float32),
+        factors=np.ones((vehicles, policies.pay.shape[1])),
     )
 
 
@@ -189,7 +199,7 @@ def play_games(
         seeds: (B,) uint64.
         results: changed.
         rules: of the game.
-        reward: of learners.
+        reward: of learners, with the factors of ``scratch``.
         scale: (2, O / k) as of mctf.observe.ranges.
         starts: of the games.
         scratch: changed.
@@ -201,6 +211,9 @@ def play_games(
         forget(state, 0, rules)
         reset(state, 0, rules)
         practise(state, 0, starts, rules)
+        for v in range(scratch.factors.shape[0]):
+            for term in range(scratch.factors.shape[1]):
+                scratch.factors[v, term] = policies.pay[players[b, v], term]
         moment = 0
         look(state, scale, rules, raw, seen)
         repeat(seen, raw.shape[1])
@@ -212,6 +225,7 @@ def play_games(
                 for v in range(len(actions)):
                     results.actions[b, v, moment] = actions[v]
             step(state, 0, actions, rules)
+            watch(state, rules, results, b)
             if record and reward.has_own:
                 remember(raw, before)
             age(seen, raw.shape[1])
@@ -288,8 +302,28 @@ def chosen(
 
 
 @part
+def watch(state: State, rules: Rules, results: Results, b: int) -> None:
+    """Adds where the vehicles of either side are after a step to the row ``b`` of the habits of ``results``."""
+    diagonal = math.sqrt(rules.width_m * rules.width_m + rules.height_m * rules.height_m)
+    for side in range(2):
+        first, last = vehicles_of(side, rules)
+        advance, spread = 0.0, 0.0
+        for v in range(first, last):
+            x, y = state.pos[0, v, 0], state.pos[0, v, 1]
+            advance += (rules.width_m - x if is_right(side, rules) else x) / rules.width_m
+            for mate in range(v + 1, last):
+                spread += apart(x, y, state.pos[0, mate, 0], state.pos[0, mate, 1]) / diagonal
+        size = last - first
+        results.habits[b, side, 0] += advance / size
+        results.habits[b, side, 1] += spread / max(size * (size - 1) // 2, 1)
+
+
+@part
 def settle(state: State, rules: Rules, b: int, results: Results) -> None:
-    """Writes scores and events of the finished game to row ``b`` of ``results``; more captures win on time."""
+    """Writes scores, events and habits of the finished game to row ``b`` of ``results``; more captures win on time."""
+    for side in range(2):
+        for habit in range(len(HABITS)):
+            results.habits[b, side, habit] /= max(results.steps[b], 1)
     ahead = lead(state, 0, finished(state, 0, rules))
     results.scores[b, 0] = 1.0 if ahead > 0 else 0.5 if ahead == 0 else 0.0
     results.scores[b, 1] = 1.0 - results.scores[b, 0]

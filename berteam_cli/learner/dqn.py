@@ -8,15 +8,18 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import torch
 from numpy.random import Generator
+from torch import Tensor
 
 from berteam_cli.acting import GREEDY, Policies, networks
 from berteam_cli.learner.adam import Adam, Trained, untrained
 from berteam_cli.learner.base import Learning
+from berteam_cli.learner.breeding import spans
 from berteam_cli.learner.fitting import check_columns
 from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, layers, uniform, weight_count
 from berteam_cli.learner.replay import Replay, empty, remember
 from berteam_cli.learner.temporal import FIGURES, Difference, follow, learn_steps, schedule
+from berteam_cli.learner.traits import tuned
 from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
@@ -85,6 +88,7 @@ class Dqn:
 
     algorithm: ClassVar[str] = "dqn"
     buffer: ClassVar[str] = "buffer_size"
+    own_traits: ClassVar[tuple[str, ...]] = ("learning_rate", "gamma")
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -128,11 +132,17 @@ class Dqn:
         return [f"{island}.{row}" for row in range(len(state.collected))]
 
     def learn(
-        self, state: DqnState, experience: Experience, first: int, rng: Generator, workers: Workers
+        self,
+        state: DqnState,
+        experience: Experience,
+        first: int,
+        rng: Generator,
+        workers: Workers,
+        traits: Floats | None = None,
     ) -> list[Learning]:
         """Adds the members' steps to their replay buffers, then takes the gradient steps these allow.
 
-        Changes ``state``.
+        With (M, H) ``traits`` each member has its own. Changes ``state``.
         """
         rngs = rng.spawn(len(state.collected))
         trajectories = experience.trajectories(first, len(state.collected))
@@ -143,7 +153,7 @@ class Dqn:
                 state.collected[row] = remember(
                     state.replay.member(row), int(state.collected[row]), experience, game, player
                 )
-            return self.member_learns(state, row, before, rngs[row])
+            return tuned(self, traits, row).member_learns(state, row, before, rngs[row])
 
         return workers.map(learn_alone, list(trajectories))
 
@@ -183,6 +193,15 @@ class Dqn:
             batches,
             renewals,
         )
+
+    @property
+    def spans(self) -> list[slice]:
+        """Where each layer lies in a member's weights."""
+        return spans(self.sizes)
+
+    def genes(self, state: DqnState) -> list[Tensor]:
+        """Returns (M, W) views of the weights, Adam's moments and the target network, which goes with the layer."""
+        return [torch.as_tensor(column) for column in (*state.trained[:3], state.target)]
 
     def copy(self, state: DqnState, child: int, parent: int) -> None:
         """Makes ``child`` a copy of ``parent``, with all that it remembers."""

@@ -10,15 +10,18 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import torch
 from numpy.random import Generator
+from torch import Tensor
 
 from berteam_cli.acting import SAMPLED, Policies, networks
 from berteam_cli.learner.adam import Adam, Trained, untrained
 from berteam_cli.learner.base import Learning
+from berteam_cli.learner.breeding import spans
 from berteam_cli.learner.fitting import check_columns
 from berteam_cli.learner.health import guarded
 from berteam_cli.learner.mlp import Singles, forward, layers, n_values, orthogonal, weight_count
 from berteam_cli.learner.rollout import Steps, advantages, append, empty, seen, stitched
 from berteam_cli.learner.surrogate import FIGURES, LOSSES, Sample, Surrogate, log_chances, one_update
+from berteam_cli.learner.traits import tuned
 from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
@@ -85,6 +88,7 @@ class Ppo:
 
     algorithm: ClassVar[str] = "ppo"
     buffer: ClassVar[str] = "n_steps"
+    own_traits: ClassVar[tuple[str, ...]] = ("learning_rate", "entropy_coef", "gamma")
 
     @property
     def policy_sizes(self) -> tuple[int, ...]:
@@ -137,18 +141,25 @@ class Ppo:
         return [f"{island}.{row}" for row in range(len(state.filled))]
 
     def learn(
-        self, state: PpoState, experience: Experience, first: int, rng: Generator, workers: Workers
+        self,
+        state: PpoState,
+        experience: Experience,
+        first: int,
+        rng: Generator,
+        workers: Workers,
+        traits: Floats | None = None,
     ) -> list[Learning]:
         """Adds the members' steps to their rollouts; whoever's is full learns from it and begins a new one.
 
         Values and probabilities are those of the weights the games were played with, even of the steps that are
-        left over when a member learns. Changes ``state``.
+        left over when a member learns. With (M, H) ``traits`` each member has its own. Changes ``state``.
         """
         rngs = rng.spawn(len(state.filled))
         trajectories = experience.trajectories(first, len(state.filled))
 
         def learn_alone(row: int) -> Learning:
-            return self.member_learns(state, row, self.judged(state, row, experience, trajectories[row]), rngs[row])
+            own = tuned(self, traits, row)
+            return own.member_learns(state, row, own.judged(state, row, experience, trajectories[row]), rngs[row])
 
         return workers.map(learn_alone, list(trajectories))
 
@@ -207,6 +218,15 @@ class Ppo:
             column[child] = column[parent]
         for emptied in (*state.rollouts, state.filled):
             emptied[child] = 0
+
+    @property
+    def spans(self) -> list[slice]:
+        """Where each layer lies in a member's weights, those of the policy first."""
+        return spans(self.policy_sizes, self.value_sizes)
+
+    def genes(self, state: PpoState) -> list[Tensor]:
+        """Returns (M, W) views of the weights and Adam's moments."""
+        return [torch.as_tensor(column) for column in state.trained[:3]]
 
     def tensors(self, state: PpoState) -> dict[str, Any]:
         """Returns all that ``state`` holds, by name."""

@@ -19,7 +19,8 @@ from berteam_cli.learner.dqn import Dqn, DqnState
 from berteam_cli.learner.replay import Replay, latest
 from berteam_cli.learner.stacked import OnDevice, acting, descend, on, outputs, put_where_finite, taken
 from berteam_cli.learner.temporal import FIGURES
-from berteam_cli.outcomes import Experience, Ints
+from berteam_cli.learner.traits import tuned
+from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.workers import Workers
 
 
@@ -42,11 +43,17 @@ class StackedDqn(Dqn):
         return super().policies(acting(state), explore=explore)
 
     def learn(
-        self, state: OnDevice, experience: Experience, first: int, rng: Generator, workers: Workers
+        self,
+        state: OnDevice,
+        experience: Experience,
+        first: int,
+        rng: Generator,
+        workers: Workers,
+        traits: Floats | None = None,
     ) -> list[Learning]:
         """Adds the members' steps to their replay buffers; then all take the gradient steps these allow, together.
 
-        Changes ``state``.
+        With (M, H) ``traits`` each member has its own. Changes ``state``.
         """
         rngs = rng.spawn(len(state.collected))
         trajectories = experience.trajectories(first, len(state.collected))
@@ -66,7 +73,8 @@ class StackedDqn(Dqn):
             self.batches(int(state.collected[row]), count, rngs[row])
             for row, (count, _) in zip(rows, plans, strict=True)
         ]
-        figures, sound = self.stepped(state, rows, batches, [renewals for _, renewals in plans])
+        own = [tuned(self, traits, row) for row in rows]
+        figures, sound = self.stepped(state, rows, batches, [renewals for _, renewals in plans], own)
         learnt = []
         for row, (count, _), numbers, well in zip(rows, plans, figures, sound, strict=True):
             means = dict(zip(FIGURES, numbers, strict=True)) if count and well else {}
@@ -75,7 +83,7 @@ class StackedDqn(Dqn):
         return learnt
 
     def stepped(
-        self, state: OnDevice, rows: list[int], batches: list[Ints], renewals: list[Ints]
+        self, state: OnDevice, rows: list[int], batches: list[Ints], renewals: list[Ints], own: list[StackedDqn]
     ) -> tuple[list[list[float]], list[bool]]:
         """Takes gradient steps of the members ``rows``, some more than others.
 
@@ -84,6 +92,7 @@ class StackedDqn(Dqn):
             rows: K members.
             batches: for each (k, n) places in its ring.
             renewals: for each (k + 1,) as ``temporal.schedule`` gives them.
+            own: the settings of each.
 
         Returns:
             For each the means of loss and of Q; and whether all is finite; if not, it stays as it was.
@@ -97,6 +106,8 @@ class StackedDqn(Dqn):
         chosen = torch.tensor(rows, device=self.device)
         newest = on(self.device, (state.collected[rows] - 1) % self.buffer_size)
         trained: OnDevice = Trained._make(taken(state.trained, chosen))
+        rates: Any = on(self.device, np.array([[x.learning_rate] for x in own]))
+        adam, gammas = self.adam._replace(learning_rate=rates), on(self.device, np.array([[x.gamma] for x in own]))
         target = state.target[chosen]
         sums = torch.zeros(len(rows), len(FIGURES), dtype=torch.float64, device=self.device)
         steps, renewing = on(self.device, at), on(self.device, renews)
@@ -105,9 +116,11 @@ class StackedDqn(Dqn):
             if step == most:
                 break
             active = step < counts
-            gradient, figures = self.gradient(state, chosen, newest, steps[:, step], trained.weights, target)
+            gradient, figures = self.gradient(
+                state, chosen, newest, steps[:, step], trained.weights, target, gammas.float()
+            )
             sums += torch.where(active[:, None], figures, 0.0)
-            descend(self.adam, trained, gradient, active)
+            descend(adam, trained, gradient, active)
         means = sums / counts.clamp(min=1)[:, None]
         sound = put_where_finite((*state.trained, state.target), chosen, (*trained, target), means)
         for row, times, well in zip(rows, renewing.sum(dim=1), sound, strict=True):
@@ -121,7 +134,14 @@ class StackedDqn(Dqn):
         return target * stays + weights * (1.0 - stays)
 
     def gradient(
-        self, state: OnDevice, rows: Tensor, newest: Tensor, at: Tensor, weights: Tensor, target: Tensor
+        self,
+        state: OnDevice,
+        rows: Tensor,
+        newest: Tensor,
+        at: Tensor,
+        weights: Tensor,
+        target: Tensor,
+        gammas: Tensor,
     ) -> tuple[Tensor, Tensor]:
         """Returns the gradients (K, W) of the members' losses, and their losses and mean Q, (K, 2).
 
@@ -132,14 +152,15 @@ class StackedDqn(Dqn):
             at: (K, n) places in their rings.
             weights: (K, W).
             target: (K, W).
+            gammas: (K, 1) float32, discount of each.
         """
         ring, who = state.replay, rows[:, None]
-        last, goals, discounts = at, ring.rewards[who, at], torch.full_like(at, self.gamma, dtype=torch.float32)
+        last, goals, discounts = at, ring.rewards[who, at], gammas.expand(at.shape)
         for _ in range(1, self.n_steps):
             goes_on = ~(ring.ends[who, last] | (last == newest[:, None]))
             last = torch.where(goes_on, (last + 1) % self.buffer_size, last)
             goals = goals + torch.where(goes_on, discounts * ring.rewards[who, last], 0.0)
-            discounts = torch.where(goes_on, discounts * self.gamma, discounts)
+            discounts = torch.where(goes_on, discounts * gammas, discounts)
         future = outputs(target, self.sizes, self.smooth, ring.next_observations[who, last]).amax(dim=2)
         goals = goals + torch.where(ring.terminated[who, last], 0.0, discounts * future)
         weights = weights.detach().requires_grad_()

@@ -18,7 +18,8 @@ from berteam_cli.learner.ppo import Ppo, PpoState, learning
 from berteam_cli.learner.rollout import Seen, Steps, advantages, append, seen, stitched
 from berteam_cli.learner.stacked import OnDevice, acting, descend, on, outputs, put_where_finite, taken
 from berteam_cli.learner.surrogate import FIGURES, KL, LOSSES, Sample
-from berteam_cli.outcomes import Experience
+from berteam_cli.learner.traits import tuned
+from berteam_cli.outcomes import Experience, Floats
 from berteam_cli.workers import Workers
 
 
@@ -41,23 +42,30 @@ class StackedPpo(Ppo):
         return super().policies(acting(state), explore=explore)
 
     def learn(
-        self, state: OnDevice, experience: Experience, first: int, rng: Generator, workers: Workers
+        self,
+        state: OnDevice,
+        experience: Experience,
+        first: int,
+        rng: Generator,
+        workers: Workers,
+        traits: Floats | None = None,
     ) -> list[Learning]:
         """Adds the members' steps to their rollouts; all whose are full learn from them together.
 
-        Changes ``state``.
+        With (M, H) ``traits`` each member has its own. Changes ``state``.
         """
+        own = [tuned(self, traits, row) for row in range(len(state.filled))]
         rngs = rng.spawn(len(state.filled))
         trajectories = experience.trajectories(first, len(state.filled))
         rows = list(trajectories)
         saw = [seen(experience, trajectories[row]) for row in rows]
-        new = dict(zip(rows, self.judged_together(state, rows, saw), strict=True))
+        new = dict(zip(rows, self.judged_together(state, rows, saw, own), strict=True))
         used = {row: append(state.rollouts, state.filled, row, new[row], 0) for row in rows}
         before = state.trained.updates.tolist()
         figures: dict[int, list[list[float]]] = {row: [] for row in rows}
         failures = dict.fromkeys(rows, 0)
         while due := [row for row in rows if state.filled[row] == self.n_steps]:
-            of_update, sound = self.updated(state, due, [rngs[row] for row in due])
+            of_update, sound = self.updated(state, due, [rngs[row] for row in due], own)
             for row, numbers, well in zip(due, of_update, sound, strict=True):
                 figures[row] += [numbers] if well else []
                 failures[row] += not well
@@ -68,8 +76,17 @@ class StackedPpo(Ppo):
         after = state.trained.updates.tolist()
         return [learning(row, figures[row], after[row] - before[row], used[row], failures[row]) for row in rows]
 
-    def judged_together(self, state: OnDevice, rows: list[int], saw: list[Seen]) -> list[OnDevice]:
-        """Returns the new steps of each member, with what its networks say of them before it learns."""
+    def judged_together(
+        self, state: OnDevice, rows: list[int], saw: list[Seen], own: list[StackedPpo]
+    ) -> list[OnDevice]:
+        """Returns the new steps of each member, with what its networks say of them before it learns.
+
+        Args:
+            state: of the island.
+            rows: K members.
+            saw: what each of them did.
+            own: (M,) the settings of each member of the island.
+        """
         if not rows:
             return []
         shape = (len(rows), max(len(x.actions) for x in saw))
@@ -82,7 +99,8 @@ class StackedPpo(Ppo):
             logs = logits.log_softmax(dim=2).gather(2, on(self.device, actions)[..., None])[..., 0].cpu().numpy()
         said = values.cpu().numpy()
         steps = [
-            stitched(x, said[k, : len(x.actions)], logs[k, : len(x.actions)], self.gamma) for k, x in enumerate(saw)
+            stitched(x, said[k, : len(x.actions)], logs[k, : len(x.actions)], own[rows[k]].gamma)
+            for k, x in enumerate(saw)
         ]
         return [Steps._make(on(self.device, column) for column in x) for x in steps]
 
@@ -92,13 +110,18 @@ class StackedPpo(Ppo):
         logits = outputs(weights[:, :cut], self.policy_sizes, self.smooth, observations)
         return logits, outputs(weights[:, cut:], self.value_sizes, self.smooth, observations)[..., 0]
 
-    def updated(self, state: OnDevice, due: list[int], rngs: list[Generator]) -> tuple[list[list[float]], list[bool]]:
-        """Lets the members ``due`` learn from their full rollouts.
+    def updated(
+        self, state: OnDevice, due: list[int], rngs: list[Generator], own: list[StackedPpo]
+    ) -> tuple[list[list[float]], list[bool]]:
+        """Lets the members ``due`` learn from their full rollouts; ``own`` (M,) are the settings of all members.
 
         Returns for each its figures, and whether they and its weights are finite; if not, it stays as it was.
         """
         rows = torch.tensor(due, device=self.device)
-        rollout = self.samples(state, rows)
+        rollout = self.samples(state, rows, [own[row].gamma for row in due])
+        entropy_coef = on(self.device, np.array([own[row].entropy_coef for row in due], dtype=np.float32))
+        rates: Any = on(self.device, np.array([[own[row].learning_rate] for row in due]))
+        adam = self.adam._replace(learning_rate=rates)
         orders = on(self.device, np.stack([self.orders(rng) for rng in rngs]))  # (K, n_epochs, n_steps)
         trained: OnDevice = Trained._make(taken(state.trained, rows))
         everyone = torch.arange(len(due), device=self.device)[:, None]
@@ -109,36 +132,45 @@ class StackedPpo(Ppo):
         for order in orders.unbind(dim=1):
             divergence, seen_in_pass, in_pass = torch.zeros_like(sums[:, KL]), torch.zeros_like(seen_in_all), near
             for at in order.split(self.minibatch_size, dim=1):
-                gradient, figures = self.gradient(trained.weights, Sample._make(x[everyone, at] for x in rollout))
+                sample = Sample._make(x[everyone, at] for x in rollout)
+                gradient, figures = self.gradient(trained.weights, sample, entropy_coef)
                 sums += torch.where(near[:, None], figures, 0.0)
                 divergence += torch.where(near, figures[:, KL], 0.0)
                 seen_in_all += near
                 seen_in_pass += near
                 near = near & ~(figures[:, KL] > 1.5 * self.surrogate.target_kl)
-                descend(self.adam, trained, gradient, near)
+                descend(adam, trained, gradient, near)
             last = torch.where(in_pass, divergence / seen_in_pass, last)
         means = sums / seen_in_all[:, None]
         means[:, KL] = last
         return means.tolist(), put_where_finite(state.trained, rows, trained, means[:, :LOSSES])
 
-    def samples(self, state: OnDevice, rows: Tensor) -> OnDevice:
-        """Returns the full rollouts of the members ``rows`` with their advantages and returns, (K, n_steps)."""
+    def samples(self, state: OnDevice, rows: Tensor, gammas: list[float]) -> OnDevice:
+        """Returns the full rollouts of the members ``rows`` with their advantages and returns, (K, n_steps).
+
+        Args:
+            state: of the island.
+            rows: (K,) members.
+            gammas: (K,) discount of each.
+        """
         rollouts: OnDevice = Steps._make(taken(state.rollouts, rows))
         host = [x.cpu().numpy() for x in (rollouts.rewards, rollouts.values, rollouts.next_values, rollouts.ends)]
         each = [
-            advantages(r, v, after, ends, self.gamma, self.gae_lambda) for r, v, after, ends in zip(*host, strict=True)
+            advantages(r, v, after, ends, gamma, self.gae_lambda)
+            for r, v, after, ends, gamma in zip(*host, gammas, strict=True)
         ]
         gains = on(self.device, np.stack(each))
         actions = rollouts.actions.long()
         returns = gains + rollouts.values
         return Sample._make((rollouts.observations, actions, rollouts.log_probs, gains, rollouts.values, returns))
 
-    def gradient(self, weights: Tensor, sample: OnDevice) -> tuple[Tensor, Tensor]:
+    def gradient(self, weights: Tensor, sample: OnDevice, entropy_coef: Tensor) -> tuple[Tensor, Tensor]:
         """Returns the gradients (K, W) of the members' losses, and their figures (K, len(FIGURES)); see ``Surrogate``.
 
         Args:
             weights: (K, W).
             sample: (K, n) steps.
+            entropy_coef: (K,) weight of the entropy.
         """
         weights = weights.detach().requires_grad_()
         logits, values = self.both(weights, sample.observations)
@@ -153,7 +185,7 @@ class StackedPpo(Ppo):
         if self.clip_range_vf is not None:
             values = sample.values + (values - sample.values).clamp(-self.clip_range_vf, self.clip_range_vf)
         value_loss = (values - sample.returns).square().mean(dim=1)
-        loss = policy_loss - self.entropy_coef * entropy + self.value_coef * value_loss
+        loss = policy_loss - entropy_coef * entropy + self.value_coef * value_loss
         (gradient,) = torch.autograd.grad(loss.sum(), weights)
         approx_kl = (ratio - 1 - log_ratio).mean(dim=1)
         clip_fraction = ((ratio - 1).abs() > self.clip_range).float().mean(dim=1)

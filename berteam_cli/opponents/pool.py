@@ -24,6 +24,7 @@ from berteam_cli.opponents.record import Record
 
 POOL = "pool"
 """The folder in a run's, where its snapshots are."""
+KEPT = tuple(name for name in Policies._fields if name != "pay")  # nobody pays the past
 
 
 def row_type(weights: int) -> npt.DTypeLike:
@@ -64,8 +65,8 @@ def written(snapshot: Snapshot, folder: Path) -> Snapshot:
     """
     rows = np.zeros(len(snapshot.members), dtype=row_type(snapshot.policies.weights.shape[1]))
     rows["member"] = snapshot.members
-    for name, column in snapshot.policies._asdict().items():
-        rows[name] = column
+    for name in KEPT:
+        rows[name] = getattr(snapshot.policies, name)
     path = folder / file_name(*snapshot.key)
     part = path.with_suffix(".part")
     try:
@@ -90,7 +91,7 @@ def opened(folder: Path, epoch: int, island: int, record: Record) -> Snapshot:
     weights = rows.dtype["weights"].shape[0] if rows.dtype.names else 0
     if rows.dtype != np.dtype(row_type(weights)) or rows.ndim != 1 or not len(rows):
         raise ValueError(f"{file_name(epoch, island)} is no snapshot")
-    policies = Policies(**{name: rows[name] for name in Policies._fields})
+    policies = Policies(**{name: rows[name] for name in KEPT}, pay=np.zeros((len(rows), 0)))
     return Snapshot(epoch, island, rows["member"], policies, record, checksum(rows))
 
 

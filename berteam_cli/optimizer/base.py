@@ -10,7 +10,7 @@ from numpy.random import Generator
 
 from berteam_cli.learner.base import Learning
 from berteam_cli.optimizer.fitness import FitnessRule
-from berteam_cli.outcomes import Experience, Ints, Outcomes
+from berteam_cli.outcomes import NOBODY, Experience, Ints, Outcomes
 from berteam_cli.population import Island, Population
 
 
@@ -25,6 +25,7 @@ class Replacement:
         removed_fitness, parent_fitness: on the scale of the tables, before the replacement.
         removed_age: epochs.
         reason: the rule that chose the removed one.
+        second_parent: who gave some of its layers, NOBODY where the copy is of one parent.
     """
 
     island: int
@@ -34,6 +35,7 @@ class Replacement:
     parent_fitness: float
     removed_age: int
     reason: str
+    second_parent: int = NOBODY
 
 
 Probe = Callable[[Population, Ints, Ints, int], Outcomes]
@@ -58,6 +60,10 @@ class Optimizer(Protocol):
     @property
     def learns(self) -> bool:
         """Whether ``train`` wants to know what the players saw."""
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """The terms of the game's reward, where members have factors of their own for them; else none."""
 
     def rate(self, population: Population, outcomes: Outcomes) -> Population:
         """Returns the population with the fitness that ``outcomes`` give."""

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.learner.base import Learning
+from berteam_cli.learner.traits import Tunable
 from berteam_cli.optimizer.base import Replacement
+from berteam_cli.optimizer.breeding import Breeding
 from berteam_cli.optimizer.fixed import Fixed
 from berteam_cli.outcomes import Experience, Floats, Ints
 from berteam_cli.population import ARRAYS, Island, Population
@@ -31,6 +33,7 @@ class Coevolution(Fixed):
         protect_new: a member of at most this age, in epochs, is never replaced.
         draw_protected: whether protected members are drawn for removal, in vain, as in the published code; else the
             draw is among those who can be replaced.
+        breeding: in what a copy differs from its parent.
     """
 
     workers: Workers
@@ -38,9 +41,15 @@ class Coevolution(Fixed):
     elites: int
     protect_new: int
     draw_protected: bool
+    breeding: Breeding
 
     learns = True
     reason = "fitness"
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """The terms of the game's reward, where members have factors of their own for them; else none."""
+        return self.breeding.perturbation.terms
 
     def train(
         self, population: Population, experience: Experience, rng: Generator
@@ -53,7 +62,12 @@ class Coevolution(Fixed):
         for i, (island, mind, stream) in enumerate(
             zip(self.islands, population.minds, rng.spawn(len(self.islands)), strict=True)
         ):
-            learnt += [(i, x) for x in island.learner.learn(mind, experience, island.first, stream, self.workers)]
+            given = (mind, experience, island.first, stream, self.workers)
+            if self.breeding.perturbation.moved and isinstance(island.learner, Tunable):
+                figures = island.learner.learn(*given, population.traits[island.members])
+            else:
+                figures = island.learner.learn(*given)
+            learnt += [(i, x) for x in figures]
         population = own(population)
         for i, x in learnt:
             member = self.islands[i].first + x.row
@@ -112,7 +126,8 @@ class Coevolution(Fixed):
             parents = everyone[rng.choice(len(everyone), size=count, p=likely)]
             for place, parent in zip(removed, parents, strict=True):
                 if population.age[place] > self.protect_new:
-                    replaced.append(self.replacement(population, int(i), int(place), int(parent), self.reason))
+                    second = self.breeding.second(everyone, likely, rng)
+                    replaced.append(self.child(population, int(i), int(place), int(parent), second, rng))
         older, _ = super().renew(population, rng)
         return older, replaced
 
@@ -133,6 +148,28 @@ class Coevolution(Fixed):
         candidates = np.sort(fittest_first[self.elites :])
         return candidates if self.draw_protected else candidates[population.age[candidates] > self.protect_new]
 
+    def child(
+        self, population: Population, i: int, place: int, parent: int, second: int, rng: Generator
+    ) -> Replacement:
+        """Puts a child of ``parent`` on ``place``; changes the arrays and minds of ``population``.
+
+        Args:
+            population: whose arrays may be changed.
+            i: index of the island.
+            place: who gives way.
+            parent: of whom the child is a copy.
+            second: who gives it layers, NOBODY for none; as they are before the place changes hands.
+            rng: what the child differs by is drawn from it.
+        """
+        island, mind, breeding = self.islands[i], population.minds[i], self.breeding
+        theirs = breeding.layers_of(island, mind, second)
+        record = self.replacement(population, i, place, parent, self.reason)
+        if breeding.vary(island, mind, place, theirs, rng):
+            population.stale[place] = True
+        own = breeding.perturbation.child(population.traits[place], population.pay[place], rng)
+        population.traits[place], population.pay[place] = own
+        return replace(record, second_parent=second)
+
     def replacement(self, population: Population, i: int, place: int, parent: int, reason: str) -> Replacement:
         """Puts a copy of ``parent`` on ``place``; changes the arrays and minds of ``population``."""
         fitness = self.fitness.shown(population.fitness[[place, parent]])
@@ -143,6 +180,7 @@ class Coevolution(Fixed):
         population.behaviour[place] = population.behaviour[parent]
         population.stale[place] = population.stale[parent]
         population.failed[place] = population.failed[parent]
+        population.traits[place], population.pay[place] = population.traits[parent], population.pay[parent]
         population.age[place] = 0
         population.games[place] = population.captain_games[place] = 0
         population.parent[place] = parent

@@ -27,6 +27,11 @@ class Fixed:
 
     learns = False
 
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """None: all members are paid alike."""
+        return ()
+
     def rate(self, population: Population, outcomes: Outcomes) -> Population:
         """Returns the population with the fitness that ``outcomes`` give."""
         return replace(counted(population, outcomes), fitness=self.fitness.rated(population.fitness, outcomes))

@@ -40,6 +40,7 @@ TERMS = (
     "won",  # the game is over since this step, and the team has won; on time, too: more captures win
     "lost",
     "drawn",
+    "step",  # one step, whatever happened: below 0, time costs something
 )
 """What a reward is made of: counts of this step, and ``nearer_m`` in m."""
 (
@@ -60,6 +61,7 @@ TERMS = (
     WON,
     LOST,
     DRAWN,
+    STEP,
 ) = range(len(TERMS))
 
 WEIGHTS: Mapping[str, Mapping[str, float]] = MappingProxyType(
@@ -107,12 +109,14 @@ class Reward(NamedTuple):
         has_own: whether ``own`` is called.
         own: compiled; takes (len(TERMS),), and (O,) twice: the unnormalised observation before and after the step.
         shaping: what is added, and how the team shares.
+        factors: (V, len(TERMS)) by what the weights are multiplied for each vehicle; none, (0, 0), for all alike.
     """
 
     weights: NDArray[np.float64]
     has_own: bool
     own: Any
     shaping: Shaping
+    factors: NDArray[np.float64] = np.zeros((0, 0))
 
 
 def progress(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
@@ -236,7 +240,7 @@ def rewards(
         happened(state, b, v, end, rules, terms)
         total = 0.0
         for term in range(len(TERMS)):
-            total += reward.weights[term] * terms[term]
+            total += weight_of(reward, v, term) * terms[term]
         if reward.has_own:
             total += reward.own(terms, before[v], after[v])
         if reward.shaping.potential != 0.0:
@@ -244,6 +248,13 @@ def rewards(
         out[v] = total
     if reward.shaping.team_share != 0.0:
         share(out, reward.shaping.team_share, rules)
+
+
+@part
+def weight_of(reward: Reward, v: int, term: int) -> float:
+    """Returns the weight of a term for vehicle ``v``."""
+    weight = reward.weights[term]
+    return weight * reward.factors[v, term] if reward.factors.shape[1] > 0 else weight
 
 
 @part
@@ -280,3 +291,4 @@ def happened(state: State, b: int, v: int, end: int, rules: Rules, out: np.ndarr
     out[WON] = end != RUNNING and ahead > 0
     out[LOST] = end != RUNNING and ahead < 0
     out[DRAWN] = end != RUNNING and ahead == 0
+    out[STEP] = 1.0

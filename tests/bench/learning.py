@@ -124,13 +124,15 @@ def way_rows() -> Iterator[Row]:
 
     actions = torch.randint(A, (20, MINIBATCH), generator=rng)
     sample = Sample(normal(SEEN), actions, normal() * 0.1 - 3, normal(), normal(), normal())
-    everyone = torch.ones(20, dtype=torch.bool)
+    everyone, entropy_coef = torch.ones(20, dtype=torch.bool), torch.full((20,), stacked.entropy_coef)
     for name, gradient in (
         ("torch.func, vmap of grad", lambda: by_vmap(stacked, trained, sample)),
-        ("baddbmm and autograd (device=cuda)", lambda: stacked.gradient(trained.weights, sample)[0]),
+        ("baddbmm and autograd (device=cuda)", lambda: stacked.gradient(trained.weights, sample, entropy_coef)[0]),
         ("baddbmm and derivatives by hand", lambda: by_hand(stacked, trained, sample)),
     ):
-        torch.testing.assert_close(gradient(), stacked.gradient(trained.weights, sample)[0], atol=1e-5, rtol=1e-3)
+        torch.testing.assert_close(
+            gradient(), stacked.gradient(trained.weights, sample, entropy_coef)[0], atol=1e-5, rtol=1e-3
+        )
 
         def step(gradient: Callable[[], Tensor] = gradient) -> None:
             descend(stacked.adam, trained, gradient(), everyone)

@@ -3,12 +3,15 @@
 import numpy as np
 
 from berteam_cli.learner.fixed import Fixed
+from berteam_cli.optimizer.breeding import Breeding
 from berteam_cli.optimizer.coevolution import Coevolution
 from berteam_cli.optimizer.fitness import CaptainElo
+from berteam_cli.optimizer.perturbing import Perturbation
 from berteam_cli.population import Island, founded
 from berteam_cli.workers import Workers
 
 RULE = CaptainElo(32, 0)
+COPIES = Breeding(Perturbation((1.0, 1.0, 1.0), 1.0, (), ()), 0.0, 0.0)  # children are their parents
 
 
 def islands(*sizes):
@@ -28,7 +31,7 @@ def population(places, fitness, age=0):
 
 
 def coevolution(places, cls=Coevolution, **settings):
-    usual = {"replacements": 1, "elites": 1, "protect_new": 5, "draw_protected": True}
+    usual = {"replacements": 1, "elites": 1, "protect_new": 5, "draw_protected": True, "breeding": COPIES}
     return cls(places, RULE, Workers(1), **(usual | settings))
 
 

@@ -11,11 +11,9 @@ from berteam_cli.learner.dqn import Dqn
 from berteam_cli.learner.ppo import Ppo
 from berteam_cli.learner.sb3 import Sb3
 from berteam_cli.learner.stacked_dqn import StackedDqn
-from berteam_cli.optimizer.coevolution import Coevolution
 from berteam_cli.outcomes import Experience
 from berteam_cli.population import Island, founded
-from berteam_cli.workers import Workers
-from tests.optimizer.makers import RULE
+from tests.optimizer.makers import coevolution
 
 SHAPE = {"observation_size": 3, "actions": 2, "network": (4,), "activation": "tanh"}
 PPO = Ppo(
@@ -43,7 +41,7 @@ SB3 = [
 
 def optimizer_and_population(learner):
     places = (Island("main", 0, 4, learner),)
-    optimizer = Coevolution(places, RULE, Workers(1), replacements=0, elites=0, protect_new=9, draw_protected=True)
+    optimizer = coevolution(places, replacements=0, elites=0, protect_new=9)
     people = founded(places, 0.0, np.random.default_rng(0))
     people.fitness[:] = [0, 1, 3, 2]
     return optimizer, people

@@ -8,19 +8,23 @@ from tests.optimizer.makers import coevolution, islands, population
 from tests.strategies import floats, outcomes
 
 OTHERS = opponents((0, 1), 2)
+USUAL = {
+    **{"radius": 1.0, "opponents": OTHERS, "probe_games": 1, "project_every": 1, "lambda_growth": 1.0},
+    **{"behaviours": ("aggression",), "scales": np.ones(1), "archive": None},
+}
 
 
 def mapelites(places, **settings):
     return coevolution(
         places,
         MapElites,
-        **({"radius": 1.0, "opponents": OTHERS, "probe_games": 1, "project_every": 1, "lambda_growth": 1.0} | settings),
+        **(USUAL | settings),
     )
 
 
 def measured(places, fitness, behaviour, age=9):
     people = population(places, fitness, age)
-    people.behaviour[:] = behaviour
+    people.behaviour[:, 0] = behaviour
     people.stale[:] = False
     return people
 
@@ -116,7 +120,7 @@ def test_projection_measures_whose_policy_changed_where_somebody_is_old_enough()
     teams, others = asked[0]
     np.testing.assert_array_equal(teams, np.zeros((6, 2)))  # member 0 twice, each of three teams twice
     np.testing.assert_array_equal(others, np.repeat(OTHERS, 2, axis=0))
-    assert after.behaviour[0] == (1 + 1 + 3) / 3
+    assert after.behaviour[0, 0] == (1 + 1 + 3) / 3
     assert np.isnan(after.behaviour[1:]).all()
     np.testing.assert_array_equal(after.stale, [False, False, True, True])
     assert mapelites(places).project(after, 2, probe) is after  # nothing is due now
