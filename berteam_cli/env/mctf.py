@@ -30,8 +30,6 @@ from mctf.shaping import BOUNDS
 from mctf.start import forget, reset
 from mctf.state import CAPTURED, GRABBED, HIT_WALL, TAGGED, State, empty
 
-MOST_STEPS = 16  # that networks see in one; rollouts and buffers hold each step so many times
-
 
 @dataclass(frozen=True, init=False, eq=False)
 class Mctf:
@@ -78,8 +76,8 @@ class Mctf:
         given = {"reward": reward, "reward_weights": reward_weights, "last_steps": last_steps, **settings}
         shaping = {name: settings.pop(name) for name in BOUNDS if name in settings}
         rules = make_rules(team_size=team_size, **settings)
-        if not 1 <= last_steps <= MOST_STEPS:
-            raise ValueError(f"last_steps must be a whole number from 1 to {MOST_STEPS}, but is {last_steps!r}.")
+        if not 1 <= last_steps <= 16:  # rollouts and buffers hold each step so many times
+            raise ValueError(f"last_steps must be a whole number from 1 to 16, but is {last_steps!r}.")
         longest = math.ceil(rules.max_time_s / (rules.substeps * rules.tau_s)) + 1  # the clock adds up with rounding
         if longest > 1_000_000:
             raise ValueError(f"max_time_s gives games of {longest} steps; at most 1000000 are allowed.")
