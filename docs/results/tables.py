@@ -1,0 +1,87 @@
+"""Prints what sweeps came to, as tables of Markdown: python docs/results/tables.py FOLDER ...
+
+A row for each variant, which is all jobs that differ in their seed only: means over the seeds and their 95 % intervals
+by Student's t; of one job alone its figures.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy.stats import t as student
+
+from berteam_cli.sweep.folder import Sweep
+
+LAST = 0.2  # of the epochs: what "at the end" means for games of the training
+HEAD = (
+    *("variant", "seeds", "expected Elo", "best member", "highest expected on the way", "won", "drawn", "lost"),
+    *("own games decided", "first capture"),
+)
+SHARES = ("won", "drawn", "lost", "own games decided")
+
+
+def spoken(values: npt.NDArray[np.float64], digits: int = 0) -> str:
+    """Returns mean and 95 % half width of one value of each seed."""
+    values = values[np.isfinite(values)]
+    if len(values) == 0:
+        return ""
+    if len(values) == 1:
+        return f"{values[0]:.{digits}f}"
+    width = float(student.ppf(0.975, len(values) - 1)) * values.std(ddof=1) / math.sqrt(len(values))
+    return f"{values.mean():.{digits}f} ± {width:.{digits}f}"
+
+
+def of_job(folder: Path) -> dict[str, float]:
+    """Returns the figures of one run."""
+    looks = pd.read_csv(folder / "evaluation.csv")
+    totals = looks[looks.opponent == "all"].set_index(["who", "epoch"])
+    choice, last = totals.loc["choice"], int(looks.epoch.max())
+    games = pd.read_csv(folder / "games.csv", usecols=["epoch", "blue_score", "blue_captures", "red_captures"])
+    late = games[games.epoch > (1 - LAST) * games.epoch.max()]
+    captured = games.epoch[(games.blue_captures + games.red_captures) > 0]
+    summary = pd.read_csv(folder / "summary.csv").iloc[0]
+    end = choice.loc[last]
+    return {
+        "expected Elo": end.elo if math.isnan(summary.expected_elo) else summary.expected_elo,
+        "best member": totals.loc[("best_member", last), "elo"],
+        "highest expected on the way": choice.elo.max(),
+        "won": end.wins / end.games,
+        "drawn": end.draws / end.games,
+        "lost": end.losses / end.games,
+        "own games decided": float((late.blue_score != 0.5).mean()),
+        "first capture": float(captured.min()) if len(captured) else math.nan,
+    }
+
+
+def of_sweep(folder: Path) -> pd.DataFrame:
+    """Returns one row a variant of all jobs in ``folder`` that are done."""
+    sweep = Sweep.read(folder)
+    common = set.intersection(*(set(words) for words in sweep.jobs.values()))
+    found: dict[str, list[dict[str, float]]] = {}
+    for job, words in sweep.jobs.items():
+        own = [x for x in words if x not in common and not x.startswith("seed=")]
+        of_variant = found.setdefault(" ".join(own) or "as it is", [])
+        if sweep.status(job)[0] == "done":
+            of_variant.append(of_job(folder / str(job)))
+    rows = []
+    for variant, figures in found.items():
+        columns = {x: np.array([figure[x] for figure in figures]) for x in HEAD[2:]}
+        said = [spoken(values, 2 if x in SHARES else 0) for x, values in columns.items()]
+        rows.append([f"`{variant}`", str(len(figures)), *said])
+    return pd.DataFrame(rows, columns=list(HEAD))
+
+
+def markdown(table: pd.DataFrame) -> str:
+    """Returns a table as Markdown, whose cells hold no bars."""
+    lines = [list(table.columns), ["---"] * len(table.columns), *table.to_numpy().tolist()]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        print(f"{Path(name).name}\n\n{markdown(of_sweep(Path(name)))}\n")
