@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import torch
@@ -20,7 +21,8 @@ from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.env.rps import Rps
 from berteam_cli.errors import InputError
 from berteam_cli.evolving import breeding, niches
-from berteam_cli.founding import archipelago, check_policies
+from berteam_cli.founding import check_policies
+from berteam_cli.frozen import everybody
 from berteam_cli.games import Games
 from berteam_cli.memory import check_memory
 from berteam_cli.opponents.none import Nobody
@@ -101,12 +103,13 @@ def env(config: EnvConfig, team_size: int) -> Env:
         raise InputError(f"env.{error}") from error
 
 
-def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False) -> Parts:
+def parts(config: TrainConfig, *, stored: Path | None = None, read_only: bool = False) -> Parts:
     """Returns everything a run is made of.
 
     Args:
         config: checked.
-        stored: whether the run has a checkpoint, which holds the members from files too: the files may be gone.
+        stored: folder of a run that has begun. Its checkpoint holds the members from files and of another run, too:
+            those may be gone.
         read_only: whether nobody is to learn, and so no room is needed for what they would learn from.
 
     Raises:
@@ -114,7 +117,7 @@ def parts(config: TrainConfig, *, stored: bool = False, read_only: bool = False)
     """
     playing = games(config)
     device = chosen_device(config.device)
-    islands = archipelago(config, playing.env, device, stored=stored)
+    islands = everybody(config, playing.env, device, stored=stored)
     members = sum(island.size for island in islands)
     if config.team_size > members:
         raise InputError(
@@ -160,9 +163,9 @@ def check_watched(every: int, game: Env) -> None:
         )
 
 
-def parts_to_read(config: TrainConfig) -> Parts:
-    """Returns the parts of a run that is only looked at: on the processor, wherever its members learnt."""
-    return parts(replace(config, device="cpu"), stored=True, read_only=True)
+def parts_to_read(config: TrainConfig, folder: Path) -> Parts:
+    """Returns the parts of the run in ``folder`` that is only looked at: on the processor, wherever members learnt."""
+    return parts(replace(config, device="cpu"), stored=folder, read_only=True)
 
 
 def curriculum(config: CurriculumConfig, game: Env) -> Curriculum:

@@ -8,9 +8,10 @@ import logging
 import os
 import shutil
 import zlib
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import torch
 from safetensors import SafetensorError
@@ -20,11 +21,12 @@ from berteam_cli.errors import InputError, RunError
 from berteam_cli.fitting import check_run, check_said
 from berteam_cli.opponents import pool
 from berteam_cli.opponents.league import League
-from berteam_cli.population import ARRAYS, Population
+from berteam_cli.population import ARRAYS, Island, Population
 from berteam_cli.tensors import below
 from berteam_cli.training import Parts, Run
 
 log = logging.getLogger("berteam")
+T = TypeVar("T")
 
 SCHEMA = 6  # raised when a file of an older version could be misread
 KEPT = 2
@@ -107,6 +109,7 @@ def write(part: Path, saved: Saved, parts: Parts) -> None:
         "table_sizes": saved.table_sizes,
         "pool": pool.names(run.league),
         "crc32": file_sum(part / "tensors.safetensors"),
+        **origins(parts.optimizer.islands),
     }
     said["checksum"] = state_sum(said)
     (part / "state.json").write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
@@ -114,6 +117,16 @@ def write(part: Path, saved: Saved, parts: Parts) -> None:
         with file.open("rb") as opened:
             os.fsync(opened.fileno())
     sync(part)
+
+
+def origins(islands: tuple[Island, ...]) -> dict[str, Any]:
+    """Returns who the members of another run are, whom no config names; nothing where there are none."""
+    said = [
+        {"island": x.name, "algorithm": x.learner.algorithm, **asdict(x.origin)}
+        for x in islands
+        if x.origin is not None
+    ]
+    return {"origins": said} if said else {}
 
 
 def sync(folder: Path) -> None:
@@ -132,10 +145,19 @@ def load(folder: Path, parts: Parts) -> Saved:
     Raises:
         RunError: there is none.
     """
+    return newest_whole(folder, lambda place: read(place, parts))
+
+
+def newest_whole(folder: Path, reading: Callable[[Path], T]) -> T:
+    """Returns what ``reading`` gives of the newest checkpoint under ``folder`` that it can read.
+
+    Raises:
+        RunError: there is none.
+    """
     damage = "there is none"
     for place in sorted((folder / "checkpoint").glob("epoch_*"), reverse=True):
         try:
-            return read(place, parts)
+            return reading(place)
         except DAMAGES as error:
             damage = f"{place.name} is damaged: {error}"
             log.warning("Checkpoint %s; the one before is tried.", damage)
@@ -163,16 +185,8 @@ def read(place: Path, parts: Parts) -> Saved:
     Raises:
         ValueError: it is of another version or was changed since it was written.
     """
-    said = json.loads((place / "state.json").read_text(encoding="utf-8"))
-    if said["schema"] != SCHEMA:
-        raise ValueError(f"its schema is {said['schema']}, this version reads {SCHEMA}")
-    check_said(said)
-    if state_sum(said) != said["checksum"] or file_sum(place / "tensors.safetensors") != said["crc32"]:
-        raise ValueError("its checksum is wrong")
-    # In memory of their own: by where a tensor lies torch chooses its kernels, and so the last bits of what comes out.
-    tensors = load_file(place / "tensors.safetensors")
-    for name in tensors:
-        tensors[name] = tensors[name].clone()
+    said = said_of(place)
+    tensors = tensors_in(place, said)
     minds = tuple(
         island.learner.restored(below(tensors, f"island.{i}.")) for i, island in enumerate(parts.optimizer.islands)
     )
@@ -184,6 +198,33 @@ def read(place: Path, parts: Parts) -> Saved:
     run = Run(said["epoch"], Population(minds=minds, **arrays), selection, said["played"], said["steps"], league)
     check_run(run, parts)
     return Saved(run, said["table_sizes"], said["seconds"])
+
+
+def said_of(place: Path) -> dict[str, Any]:
+    """Returns what the checkpoint in folder ``place`` says beside its tensors.
+
+    Raises:
+        ValueError: it is of another version or was changed since it was written.
+    """
+    said: dict[str, Any] = json.loads((place / "state.json").read_text(encoding="utf-8"))
+    if said["schema"] != SCHEMA:
+        raise ValueError(f"its schema is {said['schema']}, this version reads {SCHEMA}")
+    check_said(said)
+    if state_sum(said) != said["checksum"]:
+        raise ValueError("its checksum is wrong")
+    return said
+
+
+def tensors_in(place: Path, said: dict[str, Any]) -> dict[str, torch.Tensor]:
+    """Returns all tensors of the checkpoint in folder ``place``, which has ``said`` what it holds.
+
+    Raises:
+        ValueError: they were changed since they were written.
+    """
+    if file_sum(place / "tensors.safetensors") != said["crc32"]:
+        raise ValueError("its checksum is wrong")
+    # In memory of their own: by where a tensor lies torch chooses its kernels, and so the last bits of what comes out.
+    return {name: tensor.clone() for name, tensor in load_file(place / "tensors.safetensors").items()}
 
 
 def tensors_of(run: Run, parts: Parts) -> dict[str, torch.Tensor]:

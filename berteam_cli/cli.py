@@ -166,7 +166,8 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
         from berteam_cli.stored import goes_on  # noqa: PLC0415
 
         check_logger(config.logger)
-        build.parts(config, stored=goes_on(config, Path(config.out) if config.out else None))
+        folder = Path(config.out) if config.out else None
+        build.parts(config, stored=folder if goes_on(config, folder) else None)
     elif word == "tournament":
         from berteam_cli.command import entrants  # noqa: PLC0415
 

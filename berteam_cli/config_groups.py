@@ -409,10 +409,11 @@ class MemberConfig:
 
 @dataclass
 class PopulationConfig:
-    """The islands by name, and members from files, who make one more."""
+    """The islands by name, members from files, who make one more, and a run whose islands come behind these."""
 
     islands: dict[str, IslandConfig] = MISSING
     members: list[MemberConfig] = field(default_factory=list)
+    run: str | None = None
 
 
 @dataclass

@@ -41,7 +41,7 @@ STACKED_LEARNERS: dict[str, Callable[..., Learner[Any]]] = {"ppo": StackedPpo, "
 
 
 def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) -> tuple[Island, ...]:
-    """Returns the islands of the population, one after the other, that of members from files last.
+    """Returns the islands that the config names, one after the other, that of members from files last.
 
     Raises:
         InputError: there is none, or its learner or a file does not fit.
@@ -67,10 +67,10 @@ def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) ->
             )
         first = islands[-1].first + islands[-1].size if islands else 0
         islands.append(Island(MEMBERS, first, len(members), imported_members(members, game, stored=stored)))
-    if not islands:
+    if not islands and config.population.run is None:
         raise InputError(
             "population must have members, but has none: name islands in population.islands, "
-            "or files in 'population.members=[{file: agent.zip}]'."
+            "files in 'population.members=[{file: agent.zip}]', or a run in population.run."
         )
     return tuple(islands)
 

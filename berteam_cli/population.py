@@ -15,6 +15,21 @@ from berteam_cli.outcomes import BEHAVIOURS, NOBODY, Bools, Floats, Ints, Outcom
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where the members of an island come from that another run has.
+
+    Attributes:
+        run: its folder, as the config says it.
+        epoch: after which they are as they are.
+        members: (M,) what they are called there.
+    """
+
+    run: str
+    epoch: int
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Island:
     """Members that learn in the same way and replace each other.
 
@@ -24,6 +39,7 @@ class Island:
         size: M, how many members it has.
         learner: how they learn.
         exploits: whether they are never chosen for teams, but play against those who are.
+        origin: of members of another run; None of all others.
     """
 
     name: str
@@ -31,6 +47,7 @@ class Island:
     size: int
     learner: Learner[Any]
     exploits: bool = False
+    origin: Origin | None = None
 
     @property
     def members(self) -> slice:

@@ -28,8 +28,8 @@ def last_state(folder: Path, workers: int | str = 0, trust: Collection[str] = ()
     read_manifest(folder)
     config = checked(stored_config(folder, trust))
     config.workers = workers
-    parts = build.parts_to_read(config)
     try:
+        parts = build.parts_to_read(config, folder)
         return parts, checkpoint.load(folder, parts).run
     except RunError as error:
         raise InputError(str(error)) from error

@@ -82,6 +82,18 @@ def stored_config(folder: Path, trust: Collection[str] = ()) -> DictConfig:
     Raises:
         InputError: it cannot be read, is not a training's or another version's, or imports something else.
     """
+    config = typed_config(folder)
+    env: Any = OmegaConf.to_object(config.env)
+    check_trusted(folder, env, trust)
+    return config
+
+
+def typed_config(folder: Path) -> DictConfig:
+    """Returns the config of the training run in ``folder``, with its schemas, for whoever does not make its game.
+
+    Raises:
+        InputError: it cannot be read, or is not a training's or another version's.
+    """
     check_schema(folder)
     plain = plain_config(folder)
     try:
@@ -96,11 +108,10 @@ def stored_config(folder: Path, trust: Collection[str] = ()) -> DictConfig:
             typed.population.islands[name] = OmegaConf.structured(IslandConfig)
             typed.population.islands[name].learner = OmegaConf.structured(SCHEMAS["learner"][island.learner.name])
         config = cast("DictConfig", OmegaConf.merge(typed, plain))
-        env: Any = OmegaConf.to_object(config.env)
+        OmegaConf.to_object(config.env)
     except (OmegaConfBaseException, AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
         said = first_line(error)
         raise InputError(f"{folder / CONFIG} is no config of a training run of this version: {said}.") from error
-    check_trusted(folder, env, trust)
     return config
 
 

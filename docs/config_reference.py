@@ -171,7 +171,11 @@ def population() -> list[str]:
     )
     lines = ["## population", "", "Islands by names of their own, whatever the choice:", ""]
     lines += ["| key | what it is | allowed |", "|---|---|---|", island, member]
-    lines += ["| `population.members` | members from files: `[{file: a.zip, name: a, trust: false}]` | list |", ""]
+    lines += ["| `population.members` | members from files: `[{file: a.zip, name: a, trust: false}]` | list |"]
+    lines += [
+        "| `population.run` | folder of a run whose members join as they are, learning no more | text, or null |",
+        "",
+    ]
     for path in sorted((CONF / "population").glob("*.yaml")):
         lines += [f"- `population={path.stem}`: {title(path)}"]
     return [*lines, ""]

@@ -10,7 +10,7 @@ import yaml
 from gymnasium.spaces import Box
 from hydra import compose, initialize_config_module
 
-from berteam_cli import build
+from berteam_cli import build, cli
 from berteam_cli.compose import CONF, choices, groups, keys, prepare
 from berteam_cli.config import checked
 from berteam_cli.errors import InputError
@@ -44,8 +44,19 @@ def a_file(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def a_run(tmp_path_factory):
+    """A run of the default game that has begun."""
+    folder = tmp_path_factory.mktemp("source") / "run"
+    words = ["population=fixed_policies", "selector=uniform", "optimizer=fixed", "epochs=0", "evaluation.games=0"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["berteam", "train", *words, f"out={folder}"])
+        cli.main()
+    return folder
+
+
 @pytest.mark.parametrize(("group", "choice"), all_choices())
-def test_every_choice_builds(group, choice, a_file):
+def test_every_choice_builds(group, choice, a_file, a_run):
     if (group, choice) == ("learner", "fixed"):
         overrides = ["population=ppo6", "learner=fixed", "learner.policies=[random,random,random,random,random,random]"]
     else:
@@ -54,6 +65,8 @@ def test_every_choice_builds(group, choice, a_file):
         overrides += ["population=ppo6"]
     if choice == "imported":
         overrides += [f"population.members=[{{file: {a_file}}},{{file: {a_file}, name: twin}}]"]
+    if choice == "of_run":
+        overrides += [f"population.run={a_run}"]
     parts = build.parts(checked(composed(*overrides)))
     assert parts.selector.field.members == sum(island.size for island in parts.optimizer.islands)
 

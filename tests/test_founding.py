@@ -31,12 +31,12 @@ def test_on_the_processor_members_learn_in_compiled_functions_and_on_a_gpu_stack
     assert {x.learner.device for x in parts.optimizer.islands} == {"cuda"} == {parts.selector.device}
 
 
-def test_a_run_that_is_only_looked_at_is_on_the_processor(monkeypatch):
+def test_a_run_that_is_only_looked_at_is_on_the_processor(monkeypatch, tmp_path):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     config = checked(composed("device=cuda"))
     with pytest.raises(InputError, match="device=cuda needs a CUDA device"):
         build.parts(config)
-    assert type(build.parts_to_read(config).optimizer.islands[0].learner) is Ppo
+    assert type(build.parts_to_read(config, tmp_path).optimizer.islands[0].learner) is Ppo
 
 
 def test_every_setting_of_a_learner_reaches_it():

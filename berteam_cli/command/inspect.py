@@ -110,7 +110,7 @@ def searched(folder: Path, top: int, trust: Sequence[str]) -> Table:
     from berteam_cli.stored import stored_config  # noqa: PLC0415
     from berteam_cli.training import RECORDS, generator  # noqa: PLC0415
 
-    parts = build.parts_to_read(checked(stored_config(folder, trust)))
+    parts = build.parts_to_read(checked(stored_config(folder, trust)), folder)
     run = checkpoint.load(folder, parts).run
     found = parts.selector.likeliest(run.selection, top, generator(parts.seed, RECORDS, run.epoch))
     errors = [0.0] * len(found.teams) if found.error is None else found.error

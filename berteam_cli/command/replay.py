@@ -135,7 +135,7 @@ def of_run(config: ReplayConfig, folder: Path) -> Match:
         RunError: it has no checkpoint.
     """
     read_manifest(folder)
-    parts = build.parts_to_read(checked(stored_config(folder, trusted(config.trust))))
+    parts = build.parts_to_read(checked(stored_config(folder, trusted(config.trust))), folder)
     game = filmable(parts.games.env)
     run = checkpoint.load(folder, parts).run
     population, islands = run.population, parts.optimizer.islands

@@ -52,7 +52,7 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
     """
     folder = folder or new_folder("train")
     check_logger(config.logger)
-    parts = build.parts(config, stored=goes_on(config, folder))
+    parts = build.parts(config, stored=folder if goes_on(config, folder) else None)
     with held(folder):
         expected = held_run(config, text, folder, parts)
     show(folder, 10)
@@ -79,6 +79,9 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
         if against:
             manifest.add(trained_against="; ".join(against))
+        if origin := next((x.origin for x in parts.optimizer.islands if x.origin), None):
+            manifest.add(members_of=f"{origin.run} after epoch {origin.epoch}")
+            log.info("Members of %s after epoch %d, who learn nothing more.", origin.run, origin.epoch)
         with manifest.until_the_end(), stoppable() as stop:
             told: Any = OmegaConf.to_container(OmegaConf.create(text))
             with logger(config.logger, folder, manifest.facts, told) as also:

@@ -30,6 +30,8 @@ def headline(source: Source) -> dict[str, str]:
     facts: dict[str, str] = {"Status": str(source.manifest["status"])}
     if against := source.manifest.get("trained_against"):
         facts["Trained against"] = str(against)
+    if source.manifest.get("members_of"):
+        facts["Members of"] = str(source.manifest["members_of"])
     summary, timing = source.table("summary"), source.table("timing")
     if summary is not None and not math.isnan(summary.expected_elo[0]):
         row = summary.iloc[0]

@@ -87,7 +87,7 @@ def test_the_catalogue_is_what_hydra_finds():
         assert [choices(group) for group in catalogue.groups()] == [catalogue.choices(x) for x in catalogue.groups()]
         for command, line in lines:
             mine = catalogue.keys(command, dict(word.split("=") for word in line))
-            assert {*mine, *(["population.members"] * (command == "train"))} == {
+            assert {*mine, *(["population.members", "population.run"] * (command == "train"))} == {
                 *keys(composed(command, [], parsed(line)))
             }
 

@@ -33,7 +33,7 @@ UNTIMED = ("agents", "captain_distribution", "games", "generations", "island_dis
 
 def members_of(folder):
     """The policies of a run's members as they are evaluated, from its checkpoint."""
-    parts = build.parts(checked(stored_config(folder)), stored=True)
+    parts = build.parts(checked(stored_config(folder)), stored=folder)
     return policies(parts.optimizer.islands, checkpoint.load(folder, parts).run.population, explore=False)
 
 
