@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: help setup demo test lint coverage hooks faults bench check docs picture reference clean
+.PHONY: help setup demo test lint coverage hooks faults bench check docs picture results reference clean
 
 help: ## what can be made
 	@grep -hE '^[a-zA-Z0-9_-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -52,6 +52,15 @@ picture: setup ## the pictures of the README and docs
 	$(BIN)/berteam train experiment=paper_fixed out=outputs/picture on_exists=overwrite
 	$(BIN)/python docs/picture.py outputs/picture docs/picture.png
 	$(BIN)/python docs/field.py docs/field.png
+
+SMALL := outputs/results_small
+BOTH := hydra/launcher=joblib hydra.launcher.n_jobs=2
+
+results: setup ## docs/results.md, small: five levers, three seeds, and selectors on the same members, in some twenty minutes
+	$(BIN)/berteam sweep docs/results/small.yaml $(BOTH) hydra.sweep.dir=$(SMALL)/levers
+	$(BIN)/berteam sweep docs/results/selection.yaml $(BOTH) hydra.sweep.dir=$(SMALL)/selection population.run=$(SMALL)/levers/0,$(SMALL)/levers/1,$(SMALL)/levers/2
+	$(BIN)/python docs/results/tables.py $(SMALL)/levers
+	$(BIN)/python docs/results/selection.py $(SMALL)/selection
 
 reference: setup ## the Elos of the fixed teams that the package ships
 	$(BIN)/berteam tournament out=outputs/reference on_exists=overwrite

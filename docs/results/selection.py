@@ -1,7 +1,7 @@
 """Compares selectors on the same populations: python docs/results/selection.py FOLDER.
 
-FOLDER is of a sweep whose jobs differ in `selector` and `population.run`, as of selection.yaml. Prints each expected Elo,
-and the mean differences over the populations with 95 % intervals by Student's t.
+FOLDER is of a sweep whose jobs differ in `selector` and `population.run`, as of selection.yaml. Prints each expected
+Elo, and the mean differences over the populations with 95 % intervals by Student's t.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Prints what sweeps came to, as tables of Markdown: python docs/results/tables.py FOLDER ...
 
 A row for each variant, which is all jobs that differ in their seed only: means over the seeds and their 95 % intervals
-by Student's t; of one job alone its figures.
+by Student's t; of one job alone its figures. Results are of the selector's choice against the fixed teams. The best
+team's Elo is that of fresh games, and stands only where `berteam evaluate` was run on every job.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from berteam_cli.sweep.folder import Sweep
 
 LAST = 0.2  # of the epochs: what "at the end" means for games of the training
 HEAD = (
-    *("variant", "seeds", "expected Elo", "best member", "highest expected on the way", "won", "drawn", "lost"),
-    *("own games decided", "first capture"),
+    *("variant", "seeds", "expected Elo", "best team", "best member", "highest expected on the way"),
+    *("won", "drawn", "lost", "own games decided", "first capture"),
 )
 SHARES = ("won", "drawn", "lost", "own games decided")
 
@@ -48,6 +49,7 @@ def of_job(folder: Path) -> dict[str, float]:
     end = choice.loc[last]
     return {
         "expected Elo": end.elo if math.isnan(summary.expected_elo) else summary.expected_elo,
+        "best team": replayed(folder),
         "best member": totals.loc[("best_member", last), "elo"],
         "highest expected on the way": choice.elo.max(),
         "won": end.wins / end.games,
@@ -56,6 +58,14 @@ def of_job(folder: Path) -> dict[str, float]:
         "own games decided": float((late.blue_score != 0.5).mean()),
         "first capture": float(captured.min()) if len(captured) else math.nan,
     }
+
+
+def replayed(folder: Path) -> float:
+    """Returns the Elo of the best rated team from games that did not choose it; NaN without an evaluation."""
+    path = folder / "evaluation" / "figures.csv"
+    if not path.exists():
+        return math.nan
+    return float(pd.read_csv(path).set_index("quantity").value["best_elo_replayed"])
 
 
 def of_sweep(folder: Path) -> pd.DataFrame:
