@@ -13,7 +13,8 @@ import torch
 
 from berteam_cli.cluster import Cluster
 from berteam_cli.config_commands import RAY, CommandConfig, TrainConfig
-from berteam_cli.config_groups import CurriculumConfig, EnvConfig, OptimizerConfig
+from berteam_cli.config_env import CurriculumConfig, EnvConfig
+from berteam_cli.config_groups import OptimizerConfig
 from berteam_cli.curriculum import Curriculum, Practising
 from berteam_cli.env.base import Env, blank_trajectories
 from berteam_cli.env.mctf import Mctf

@@ -13,15 +13,18 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from berteam_cli import config_commands, config_groups
+from berteam_cli import config_commands, config_env, config_groups, config_members
 from berteam_cli.bounds import check_bounds
 from berteam_cli.errors import InputError, did_you_mean
 
+MODULES = (config_env, config_members, config_groups, config_commands)
+"""Where schemas are."""
+
 SCHEMAS: dict[str, dict[str, type]] = {
     "env": {
-        "mctf": config_groups.MctfConfig,
-        "rps": config_groups.RpsConfig,
-        "pettingzoo": config_groups.PettingzooConfig,
+        "mctf": config_env.MctfConfig,
+        "rps": config_env.RpsConfig,
+        "pettingzoo": config_env.PettingzooConfig,
     },
     "selector": {
         "uniform": config_groups.UniformConfig,
@@ -38,17 +41,17 @@ SCHEMAS: dict[str, dict[str, type]] = {
         "mapelites": config_groups.MapElitesConfig,
     },
     "learner": {
-        "fixed": config_groups.FixedLearnerConfig,
-        "ppo": config_groups.PpoConfig,
-        "dqn": config_groups.DqnConfig,
-        "sb3": config_groups.Sb3Config,
+        "fixed": config_members.FixedLearnerConfig,
+        "ppo": config_members.PpoConfig,
+        "dqn": config_members.DqnConfig,
+        "sb3": config_members.Sb3Config,
     },
-    "population": {"islands": config_groups.PopulationConfig},
+    "population": {"islands": config_members.PopulationConfig},
     "opponents": {
-        "none": config_groups.OpponentsConfig,
-        "past": config_groups.PastConfig,
-        "scripted": config_groups.ScriptedConfig,
-        "league": config_groups.LeagueConfig,
+        "none": config_env.OpponentsConfig,
+        "past": config_env.PastConfig,
+        "scripted": config_env.ScriptedConfig,
+        "league": config_env.LeagueConfig,
     },
     "evaluation": {"truth": config_groups.EvaluationConfig},
     "logger": {
@@ -57,7 +60,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
         "wandb": config_groups.WandbConfig,
         "mlflow": config_groups.MlflowConfig,
     },
-    "curriculum": {"none": config_groups.CurriculumConfig, "starts": config_groups.CurriculumConfig},
+    "curriculum": {"none": config_env.CurriculumConfig, "starts": config_env.CurriculumConfig},
     "command": {
         "train": config_commands.TrainConfig,
         "tournament": config_commands.TournamentConfig,
@@ -97,7 +100,7 @@ def one_line(error: OmegaConfBaseException) -> str:
     said = str(error).splitlines()[0].rstrip(".")
     key = getattr(error, "full_key", None)
     if key and (unknown := re.fullmatch(r"Key '(.*)' not in '(\w+)'", said)):
-        schema = getattr(config_groups, unknown[2], None) or getattr(config_commands, unknown[2])
+        schema = next(getattr(x, unknown[2]) for x in MODULES if hasattr(x, unknown[2]))
         known = [item.name for item in fields(schema)]
         near = did_you_mean(unknown[1], known)
         return f"{key} is no key here; there are {', '.join(known)}.{near}"

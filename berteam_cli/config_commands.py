@@ -8,17 +8,9 @@ from typing import Any
 from omegaconf import MISSING
 
 from berteam_cli.bounds import choice, number, number_or
-from berteam_cli.config_groups import (
-    CurriculumConfig,
-    EnvConfig,
-    EvaluationConfig,
-    LearnerConfig,
-    LoggerConfig,
-    OpponentsConfig,
-    OptimizerConfig,
-    PopulationConfig,
-    SelectorConfig,
-)
+from berteam_cli.config_env import CurriculumConfig, EnvConfig, OpponentsConfig
+from berteam_cli.config_groups import EvaluationConfig, LoggerConfig, OptimizerConfig, SelectorConfig
+from berteam_cli.config_members import LearnerConfig, PopulationConfig
 
 RAY = "ray"
 """Who plays, if not so many threads."""

@@ -10,7 +10,8 @@ from typing import Any
 
 from berteam_cli.acting import Policies, joined
 from berteam_cli.config_commands import TrainConfig
-from berteam_cli.config_groups import IslandConfig, LeagueConfig, LearnerConfig, MemberConfig
+from berteam_cli.config_env import LeagueConfig
+from berteam_cli.config_members import IslandConfig, LearnerConfig, MemberConfig
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.errors import InputError

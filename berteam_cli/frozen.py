@@ -16,7 +16,7 @@ from torch import Tensor
 from berteam_cli import checkpoint
 from berteam_cli.config import checked
 from berteam_cli.config_commands import TrainConfig
-from berteam_cli.config_groups import EnvConfig
+from berteam_cli.config_env import EnvConfig
 from berteam_cli.env.base import Env
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.fitting import check_policies

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from berteam_cli.config_commands import TrainConfig
-from berteam_cli.config_groups import LeagueConfig, OpponentsConfig, PastConfig, ScriptedConfig
+from berteam_cli.config_env import LeagueConfig, OpponentsConfig, PastConfig, ScriptedConfig
 from berteam_cli.env.base import Env
 from berteam_cli.errors import InputError
 from berteam_cli.founding import check_policies

@@ -16,7 +16,7 @@ from omegaconf.errors import OmegaConfBaseException
 from berteam_cli.checkpoint import check_schema
 from berteam_cli.config import SCHEMAS
 from berteam_cli.config_commands import TrainConfig
-from berteam_cli.config_groups import IslandConfig
+from berteam_cli.config_members import IslandConfig
 from berteam_cli.errors import InputError
 from berteam_cli.folder import CONFIG, MANIFEST, Manifest, claim, write_text
 from berteam_cli.holding import held

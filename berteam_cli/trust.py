@@ -13,7 +13,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
-from berteam_cli.config_groups import EnvConfig, MctfConfig, PettingzooConfig
+from berteam_cli.config_env import EnvConfig, MctfConfig, PettingzooConfig
 from berteam_cli.errors import InputError
 
 TRUST = "trust"

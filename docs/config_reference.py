@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from berteam_cli import config_commands, config_groups
 from berteam_cli.bounds import LIMIT
-from berteam_cli.config import SCHEMAS
+from berteam_cli.config import MODULES, SCHEMAS
 
 CONF = Path(__file__).parent.parent / "conf"
 HEAD = """# Every key of the configuration
@@ -84,7 +83,7 @@ def title(path: Path) -> str:
 def schema_field(schema: type, dotted: str) -> tuple[Any, dict[str, Any]]:
     """Returns the type and the bounds of a key of ``schema``."""
     name, _, rest = dotted.partition(".")
-    hint = typing.get_type_hints(schema, vars(config_groups) | vars(config_commands))[name]
+    hint = typing.get_type_hints(schema, {k: v for x in MODULES for k, v in vars(x).items()})[name]
     if rest:
         return schema_field(next(x for x in (typing.get_args(hint) or (hint,)) if dataclasses.is_dataclass(x)), rest)
     return hint, dict(next(x for x in dataclasses.fields(schema) if x.name == name).metadata)

@@ -14,7 +14,7 @@ from berteam_cli import build
 from berteam_cli.acting import Policies, fixed_policies, joined, noisy
 from berteam_cli.config import checked
 from berteam_cli.config_commands import TournamentConfig
-from berteam_cli.config_groups import EnvConfig, MctfConfig
+from berteam_cli.config_env import EnvConfig, MctfConfig
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.evaluation.reference import table_name
 from berteam_cli.founding import check_policies

@@ -7,7 +7,7 @@ import pytest
 
 from berteam_cli.acting import fixed_policies, joined
 from berteam_cli.build import curriculum
-from berteam_cli.config_groups import CurriculumConfig
+from berteam_cli.config_env import CurriculumConfig
 from berteam_cli.curriculum import Curriculum
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.rps import Rps
