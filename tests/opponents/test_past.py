@@ -108,7 +108,7 @@ def test_the_fittest_of_those_that_learn_are_frozen():
 
 
 def test_what_was_played_is_in_the_records():
-    made = parts("opponents=past", "opponents.snapshot_every=100", "opponents.half_life=0")
+    made = parts("opponents=past", "opponents.past_share=0.25", "opponents.snapshot_every=100", "opponents.half_life=0")
     run, beaten = begin(made), 0.0
     for number in range(1, 4):
         run, report = epoch(run, made)
