@@ -13,7 +13,7 @@ from berteam_cli.opponents.base import Opponents
 from berteam_cli.opponents.exploiters import Exploiters
 from berteam_cli.opponents.league import League
 from berteam_cli.opponents.none import Nobody
-from berteam_cli.opponents.past import Past, learns
+from berteam_cli.opponents.past import Past
 from berteam_cli.opponents.scripted import Scripted
 from berteam_cli.outcomes import Bools, Ints
 from berteam_cli.population import Island
@@ -39,7 +39,7 @@ def opponents(config: TrainConfig, islands: tuple[Island, ...], game: Env, *, le
         check_exploiters(told, islands)
     if not sum(games.values()):
         return Nobody(game.sides, game.team_size)
-    if not learning or not any(learns(island) and not island.exploits for island in islands):
+    if not learning or not any(island.learns and not island.exploits for island in islands):
         raise InputError(
             f"opponents={told.name} needs members that learn from games against them, but with "
             f"optimizer={config.optimizer.name} and this population there are none; use opponents=none."
@@ -133,7 +133,7 @@ def check_exploiters(told: LeagueConfig, islands: tuple[Island, ...]) -> None:
     Raises:
         InputError: they are not.
     """
-    able = {island.name: learns(island) for island in islands}
+    able = {island.name: island.learns for island in islands}
     for name in told.exploiters:
         if name not in able:
             raise InputError.choice("opponents.exploiters", name, able)

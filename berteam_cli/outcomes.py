@@ -87,8 +87,8 @@ class Outcomes:
         """Returns these games and then those of ``later``."""
         return Outcomes(self.lineups.followed_by(later.lineups), *joined_fields(self, later)[1:])
 
-    def of(self, games: slice) -> Outcomes:
-        """Returns those of some of the games."""
+    def of(self, games: slice | Ints) -> Outcomes:
+        """Returns those of some of the games, in the order in which ``games`` names them."""
         lineups = Lineups(*cut_fields(self.lineups, games))
         return Outcomes(lineups, *cut_fields(self, games)[1:])
 
@@ -145,7 +145,7 @@ class Experience:
         return played
 
 
-def cut_fields(record: Any, rows: slice) -> list[Any]:
+def cut_fields(record: Any, rows: slice | Ints) -> list[Any]:
     """Returns ``rows`` of the arrays of a record; fields that hold no array come as None."""
     values = (getattr(record, x.name) for x in fields(record))
     return [value[rows] if isinstance(value, np.ndarray) else None for value in values]

@@ -54,6 +54,16 @@ class Island:
         """Where its members stand in an array over the population."""
         return slice(self.first, self.first + self.size)
 
+    @property
+    def numbers(self) -> range:
+        """Its members, one after the other."""
+        return range(self.first, self.first + self.size)
+
+    @property
+    def learns(self) -> bool:
+        """Whether its members change."""
+        return self.learner.algorithm not in {"fixed", "imported"}
+
 
 @dataclass(frozen=True)
 class Population:

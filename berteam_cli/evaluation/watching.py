@@ -12,10 +12,8 @@ from berteam_cli.evaluation.reference import Reference
 from berteam_cli.evaluation.sight import ALL, BEST_MEMBER, BEST_TEAM, CHOICE, Line, Sight
 from berteam_cli.evaluation.truth import Chosen, Fixture, Truth, fixture, rated
 from berteam_cli.games import arrangements
-from berteam_cli.learner.fixed import Fixed
-from berteam_cli.learner.imported import Imported
 from berteam_cli.optimizer.base import Optimizer
-from berteam_cli.outcomes import EVENTS, Bools, Floats, Ints, Lineups, Outcomes
+from berteam_cli.outcomes import EVENTS, Bools, Floats, Ints, Outcomes
 from berteam_cli.population import Population, policies
 from berteam_cli.rating.copies import clusters
 from berteam_cli.records import team_names
@@ -66,12 +64,7 @@ def best_member(optimizer: Optimizer, population: Population) -> int:
     Of several as fit it is the one that has played most: members that have not played have the fitness that they began
     with, and under a moving average of scores that may be the highest there is.
     """
-    learning = [
-        n
-        for island in optimizer.islands
-        if optimizer.learns and not isinstance(island.learner, Fixed | Imported)
-        for n in range(island.first, island.first + island.size)
-    ]
+    learning = [n for island in optimizer.islands if optimizer.learns and island.learns for n in island.numbers]
     return max(learning or range(population.size), key=lambda n: (population.fitness[n], population.games[n]))
 
 
@@ -108,13 +101,12 @@ class Played:
 
     def of(self, index: Ints, teams: Ints) -> Played:
         """Returns the games at ``index``, (K', J, G'), as those of K' ``teams``."""
-        whole, come, at = self.fixture, self.outcomes, index.ravel()
-        lineups = Lineups(whole.lineups.teams[at], whole.lineups.captains[at], whole.lineups.log_chances[at])
-        alike = clusters(self.env, whole.acting, lineups.teams)
+        whole, at = self.fixture, index.ravel()
+        outcomes = self.outcomes.of(at)
+        alike = clusters(self.env, whole.acting, outcomes.lineups.teams)
         settled = np.zeros(index.shape[:2], dtype=np.bool_)  # so few games leave everything open
         shape = (index.shape[0], index.shape[1], index.shape[2])
-        games = Fixture(whole.acting, lineups, whole.held[at], shape, alike, settled)
-        outcomes = Outcomes(lineups, come.scores[at], come.steps[at], come.events[at], come.seeds[at])
+        games = Fixture(whole.acting, outcomes.lineups, whole.held[at], shape, alike, settled)
         return Played(self.env, teams, self.reference, games, outcomes)
 
     def rated(self) -> Truth:

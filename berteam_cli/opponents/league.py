@@ -14,7 +14,7 @@ from numpy.random import Generator
 from berteam_cli.acting import Policies, fixed_policies, joined
 from berteam_cli.opponents.base import EXPLOITER, PAST, Choose, Guest, Guests, Met, hosted
 from berteam_cli.opponents.exploiters import Attempt, Exploiters, anew
-from berteam_cli.opponents.past import Past, Snapshot, numbers, taken, thinned
+from berteam_cli.opponents.past import Past, Snapshot, taken, thinned
 from berteam_cli.opponents.record import Record
 from berteam_cli.opponents.scripted import Scripted
 from berteam_cli.outcomes import NOBODY, Ints
@@ -101,7 +101,7 @@ class League:
                 continue
             island, score = self.islands[attempt.island], 1 - self.exploiters.beaten(attempt)
             if self.past:
-                pool.append(taken(self.islands, population, np.array(numbers(island)), epoch, attempt.island))
+                pool.append(taken(self.islands, population, np.array(island.numbers), epoch, attempt.island))
             population = anew(self.islands, population, attempt.island, rng)
             attempts[k] = Attempt(attempt.island, epoch)
             log.info(

@@ -77,7 +77,7 @@ class Past:
 
     def frozen(self, islands: tuple[Island, ...], population: Population, epoch: int) -> Snapshot:
         """Returns the members that learn and are chosen for teams, or the fittest of them, as they act now."""
-        able = np.array([n for island in islands if learns(island) and not island.exploits for n in numbers(island)])
+        able = np.array([n for island in islands if island.learns and not island.exploits for n in island.numbers])
         fittest_first = able[np.argsort(-population.fitness[able], kind="stable")]
         return taken(islands, population, np.sort(fittest_first[: self.snapshot_members]), epoch, NOBODY)
 
@@ -147,13 +147,3 @@ def taken(islands: tuple[Island, ...], population: Population, members: Ints, ep
 def chosen_rows(table: Policies, rows: Ints) -> Policies:
     """Returns copies of ``rows``, (K,), of ``table``."""
     return Policies._make(np.ascontiguousarray(column[rows]) for column in table)
-
-
-def learns(island: Island) -> bool:
-    """Returns whether members of ``island`` change."""
-    return island.learner.algorithm not in {"fixed", "imported"}
-
-
-def numbers(island: Island) -> range:
-    """Returns the members of ``island``."""
-    return range(island.first, island.first + island.size)
