@@ -118,7 +118,8 @@ def append(rollouts: Steps, filled: Ints, row: int, new: Steps, start: int) -> i
     at = filled[row]
     count = min(rollouts.actions.shape[1] - at, len(new.actions) - start)
     columns: tuple[Any, ...] = rollouts
-    for kept, column in zip(columns, new, strict=True):
+    added: tuple[Any, ...] = new
+    for kept, column in zip(columns, added, strict=True):
         kept[row, at : at + count] = column[start : start + count]
     filled[row] += count
     return int(count)

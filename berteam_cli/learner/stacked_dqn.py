@@ -64,8 +64,8 @@ class StackedDqn(Dqn):
         for row, games in trajectories.items():
             for game, player in games:
                 at, new = latest(self.buffer_size, int(state.collected[row]), experience, game, player)
-                column: npt.NDArray[Any]
-                for kept, column in zip(state.replay, new, strict=True):
+                columns: tuple[npt.NDArray[Any], ...] = new
+                for kept, column in zip(state.replay, columns, strict=True):
                     kept[row, on(self.device, at)] = on(self.device, column)
                 state.collected[row] += experience.lengths[game]
         plans = [self.plan(int(before[row]), int(state.collected[row])) for row in rows]
