@@ -218,14 +218,18 @@ def test_other_workers_are_refused(given, berteam, tmp_path):  # noqa: F811
 def test_ctrl_c_leaves_no_process(machines, tmp_path):
     """Of a Ray that the command started for itself."""
     environment = {name: value for name, value in os.environ.items() if name != "RAY_ADDRESS"}
-    words = [str(BERTEAM), "tournament", "games_per_pair=2000", "workers=ray", "out=run"]
+    heard = ["env", "--default-signal=INT"]  # else it is deaf where a shell started the tests in the background
+    words = [*heard, str(BERTEAM), "tournament", "games_per_pair=2000", "workers=ray", "out=run"]
     run = subprocess.Popen(
         words, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True, start_new_session=True
     )
-    assert any("Games are played by Ray on 1 machine(s)" in line for line in run.stdout)
-    time.sleep(1)
-    os.killpg(run.pid, signal.SIGINT)
-    said, _ = run.communicate(timeout=60)
+    try:
+        assert any("Games are played by Ray on 1 machine(s)" in line for line in run.stdout)
+        time.sleep(1)
+        os.killpg(run.pid, signal.SIGINT)
+        said, _ = run.communicate(timeout=60)
+    finally:
+        run.kill()
     assert run.returncode == 130
     assert "Interrupted." in said
     assert not session(run.pid)
