@@ -59,12 +59,13 @@ class Watching:
 
 
 def best_member(optimizer: Optimizer, population: Population) -> int:
-    """Returns the fittest member, of those that learn if any do.
+    """Returns the fittest member, of those that learn if any do; no exploiter, as those are chosen for no team.
 
     Of several as fit it is the one that has played most: members that have not played have the fitness that they began
     with, and under a moving average of scores that may be the highest there is.
     """
-    learning = [n for island in optimizer.islands if optimizer.learns and island.learns for n in island.numbers]
+    chosen = [island for island in optimizer.islands if optimizer.learns and island.learns and not island.exploits]
+    learning = [n for island in chosen for n in island.numbers]
     return max(learning or range(population.size), key=lambda n: (population.fitness[n], population.games[n]))
 
 

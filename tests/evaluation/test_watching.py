@@ -153,6 +153,14 @@ def test_the_best_member_is_the_fittest_that_learns(parts):
     assert best_member(mixed, replace(people, fitness=fitness, games=games)) == 5
 
 
+def test_the_best_member_is_none_whom_nobody_can_choose(parts):
+    (island,) = parts.optimizer.islands
+    both = (replace(island, size=3), replace(island, name="exploiters", first=3, size=3, exploits=True))
+    fitness = np.array([0.2, 0.5, 0.1, 0.4, 0.9, 0.3])
+    people = replace(begin(parts).population, fitness=fitness)
+    assert best_member(replace(parts.optimizer, islands=both), people) == 1
+
+
 def test_a_look_is_the_same_whoever_takes_it_and_changes_nothing(parts):
     run, learner = begin(parts), parts.optimizer.islands[0].learner
     before = {name: x.clone() for name, x in learner.tensors(run.population.minds[0]).items()}
