@@ -11,18 +11,19 @@ from berteam_cli.compose import check, prepare
 from tests.docs.pages import ROOT
 
 RESULTS = ROOT / "docs" / "results"
+SCRIPTS = ("tables", "selection", "roles")
 
 
 @pytest.fixture
 def scripts(monkeypatch):
     monkeypatch.syspath_prepend(str(RESULTS))
-    yield __import__("tables"), __import__("selection")
-    for name in ("tables", "selection"):
+    yield tuple(__import__(name) for name in SCRIPTS)
+    for name in SCRIPTS:
         sys.modules.pop(name)
 
 
 def test_an_interval_is_student_s(scripts):
-    tables, _ = scripts
+    tables, *_ = scripts
     # Mean 2, deviation 1, t of 2 degrees of freedom 4.303: 4.303 / √3 = 2.484.
     assert tables.spoken(np.array([1.0, 2.0, 3.0]), 2) == "2.00 ± 2.48"
     assert tables.spoken(np.array([7.0, np.nan])) == "7"
@@ -30,10 +31,29 @@ def test_an_interval_is_student_s(scripts):
 
 
 def test_selectors_are_compared_population_by_population(scripts):
-    _, selection = scripts
+    _, selection, _ = scripts
     elos = pd.DataFrame({"berteam": [1010.0, 1110.0], "uniform": [1000.0, 1100.0]}, index=["a", "b"])
     elos.index.name = "population"
     assert "| berteam - uniform | 2 | 10 ± 0 |" in selection.compared(elos)
+
+
+def test_roles_are_what_members_add_to_their_teams(scripts):
+    *_, roles = scripts
+    rng = np.random.default_rng(0)
+    grabs, tags = np.array([0.5, 0.0, 0.25]), np.array([0.0, 2.0, 1.0])
+    teams = {side: rng.integers(3, size=(40, 2)) for side in ("blue", "red")}
+    games = pd.DataFrame({side: ["-".join(map(str, team)) for team in of] for side, of in teams.items()})
+    for side, of in teams.items():
+        games[f"{side}_grabs"], games[f"{side}_tags"] = grabs[of].sum(axis=1), tags[of].sum(axis=1)
+        games[f"{side}_captures"], games[f"{side}_score"] = 0.0, 0.5
+    found = roles.roles(games[games.index >= 10])
+    assert found["grabs"].to_list() == pytest.approx(grabs) and found["tags"].to_list() == pytest.approx(
+        tags, abs=1e-12
+    )
+    assert found["score"].to_list() == pytest.approx([0.25] * 3)
+    late = np.concatenate([of[10:] for of in teams.values()])
+    assert found["share of places"].to_list() == pytest.approx(np.bincount(late.ravel(), minlength=3) / late.size)
+    assert "| 1 | " in roles.shown(found)
 
 
 def test_the_sweeps_can_be_run():
