@@ -16,7 +16,7 @@ from berteam_cli.opponents.none import Nobody
 from berteam_cli.opponents.past import Past
 from berteam_cli.opponents.scripted import Scripted
 from berteam_cli.outcomes import Bools, Ints
-from berteam_cli.population import Island
+from berteam_cli.population import Island, learners
 
 SHARES = ("past_share", "scripted_share", "exploit_share")
 
@@ -39,7 +39,7 @@ def opponents(config: TrainConfig, islands: tuple[Island, ...], game: Env, *, le
         check_exploiters(told, islands)
     if not sum(games.values()):
         return Nobody(game.sides, game.team_size)
-    if not learning or not any(island.learns and not island.exploits for island in islands):
+    if not learning or not learners(islands):
         raise InputError(
             f"opponents={told.name} needs members that learn from games against them, but with "
             f"optimizer={config.optimizer.name} and this population there are none; use opponents=none."

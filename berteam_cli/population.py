@@ -131,6 +131,11 @@ def founded(islands: tuple[Island, ...], fitness: float, rng: Generator, terms: 
     )
 
 
+def learners(islands: tuple[Island, ...]) -> list[int]:
+    """Returns the members that learn and are chosen for teams: no exploiters."""
+    return [n for island in islands if island.learns and not island.exploits for n in island.numbers]
+
+
 def island_of(islands: tuple[Island, ...]) -> Ints:
     """Returns (N,) the island of each member."""
     return np.repeat(np.arange(len(islands)), [island.size for island in islands])

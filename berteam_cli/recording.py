@@ -149,7 +149,7 @@ class Recorder:
         called = names(self.parts.optimizer.islands, people)
         aggression, advance, spread = people.behaviour.T
         for island in self.parts.optimizer.islands:
-            for n in range(island.first, island.first + island.size):
+            for n in island.numbers:
                 yield (
                     *(run.epoch, n, called[n], island.name, island.learner.algorithm, fitness[n]),
                     *(people.age[n], people.games[n], people.captain_games[n], people.parent[n], aggression[n]),

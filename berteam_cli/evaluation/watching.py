@@ -14,7 +14,7 @@ from berteam_cli.evaluation.truth import Chosen, Fixture, Truth, fixture, rated
 from berteam_cli.games import arrangements
 from berteam_cli.optimizer.base import Optimizer
 from berteam_cli.outcomes import EVENTS, Bools, Floats, Ints, Outcomes
-from berteam_cli.population import Population, policies
+from berteam_cli.population import Population, learners, policies
 from berteam_cli.rating.copies import clusters
 from berteam_cli.records import team_names
 from berteam_cli.training import WATCHED, Parts, Run, generator, key
@@ -64,8 +64,7 @@ def best_member(optimizer: Optimizer, population: Population) -> int:
     Of several as fit it is the one that has played most: members that have not played have the fitness that they began
     with, and under a moving average of scores that may be the highest there is.
     """
-    chosen = [island for island in optimizer.islands if optimizer.learns and island.learns and not island.exploits]
-    learning = [n for island in chosen for n in island.numbers]
+    learning = learners(optimizer.islands) if optimizer.learns else []
     return max(learning or range(population.size), key=lambda n: (population.fitness[n], population.games[n]))
 
 

@@ -96,7 +96,7 @@ def figures_of(
     figures |= {f"selector/{name}": value for name, value in state.items()}
     fitness = parts.optimizer.fitness.shown(run.population.fitness)
     for island in parts.optimizer.islands:
-        members = fitness[island.first : island.first + island.size]
+        members = fitness[island.members]
         figures |= {f"fitness/{island.name}": members.mean(), f"fitness/{island.name}_best": members.max()}
     figures |= {"population/replaced": len(report.replaced)}
     for algorithm in dict.fromkeys(parts.optimizer.islands[i].learner.algorithm for i, _ in report.learnt):

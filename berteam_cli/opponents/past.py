@@ -17,7 +17,7 @@ from berteam_cli.opponents.base import PAST, Guest
 from berteam_cli.opponents.record import Record
 from berteam_cli.optimizer.fitness import proportional
 from berteam_cli.outcomes import NOBODY, Floats, Ints
-from berteam_cli.population import Island, Population, policies
+from berteam_cli.population import Island, Population, learners, policies
 from berteam_cli.records import team_name
 
 
@@ -77,7 +77,7 @@ class Past:
 
     def frozen(self, islands: tuple[Island, ...], population: Population, epoch: int) -> Snapshot:
         """Returns the members that learn and are chosen for teams, or the fittest of them, as they act now."""
-        able = np.array([n for island in islands if island.learns and not island.exploits for n in island.numbers])
+        able = np.array(learners(islands))
         fittest_first = able[np.argsort(-population.fitness[able], kind="stable")]
         return taken(islands, population, np.sort(fittest_first[: self.snapshot_members]), epoch, NOBODY)
 

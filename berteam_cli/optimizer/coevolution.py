@@ -121,7 +121,7 @@ class Coevolution(Fixed):
             if count == 0:
                 continue
             removed = candidates[rng.choice(len(candidates), size=count, replace=False, p=chances)]
-            everyone = np.arange(self.islands[i].first, self.islands[i].first + self.islands[i].size)
+            everyone = np.array(self.islands[i].numbers)
             likely = self.fitness.clone_chances(population.fitness[everyone])
             parents = everyone[rng.choice(len(everyone), size=count, p=likely)]
             for place, parent in zip(removed, parents, strict=True):
@@ -143,7 +143,7 @@ class Coevolution(Fixed):
         """
         if island.exploits:
             return np.zeros(0, dtype=np.int64)
-        everyone = np.arange(island.first, island.first + island.size)
+        everyone = np.array(island.numbers)
         fittest_first = everyone[np.argsort(-population.fitness[everyone], kind="stable")]
         candidates = np.sort(fittest_first[self.elites :])
         return candidates if self.draw_protected else candidates[population.age[candidates] > self.protect_new]

@@ -47,9 +47,8 @@ def test_roles_are_what_members_add_to_their_teams(scripts):
         games[f"{side}_grabs"], games[f"{side}_tags"] = grabs[of].sum(axis=1), tags[of].sum(axis=1)
         games[f"{side}_captures"], games[f"{side}_score"] = 0.0, 0.5
     found = roles.roles(games[games.index >= 10])
-    assert found["grabs"].to_list() == pytest.approx(grabs) and found["tags"].to_list() == pytest.approx(
-        tags, abs=1e-12
-    )
+    assert found["grabs"].to_list() == pytest.approx(grabs)
+    assert found["tags"].to_list() == pytest.approx(tags, abs=1e-12)
     assert found["score"].to_list() == pytest.approx([0.25] * 3)
     late = np.concatenate([of[10:] for of in teams.values()])
     assert found["share of places"].to_list() == pytest.approx(np.bincount(late.ravel(), minlength=3) / late.size)
