@@ -51,7 +51,6 @@ def broken(terms, before, after):
 def machines():
     """Two machines of one processor each; RAY_ADDRESS is theirs."""
     ray = pytest.importorskip("ray", reason=MISSING)
-    from ray._raylet import Config  # noqa: PLC0415 (an extra)
     from ray.cluster_utils import Cluster as Machines  # noqa: PLC0415 (an extra)
 
     folder = tempfile.mkdtemp(prefix="ray")  # short, as sockets want it
@@ -59,7 +58,7 @@ def machines():
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex())  # else Ray keeps one in the user's home
         patch.setenv("RAY_AUTH_MODE", "token")
-        Config.initialize("")  # reads the mode again
+        read_authentication()
         head = {**QUIET, "temp_dir": folder}
         made = Machines(initialize_head=True, head_node_args=head)
         try:
@@ -70,6 +69,15 @@ def machines():
             ray.shutdown()
             made.shutdown()
             shutil.rmtree(folder, ignore_errors=True)
+    read_authentication()
+
+
+def read_authentication():
+    """Lets Ray read mode and token anew: it keeps those of the first Ray of a process, whichever test started that."""
+    from ray._raylet import AuthenticationTokenLoader, Config  # noqa: PLC0415 (an extra)
+
+    Config.initialize("")
+    AuthenticationTokenLoader.instance().reset_cache()
 
 
 def raylet(machine):

@@ -11,7 +11,7 @@ from berteam_cli.compose import check, prepare
 from tests.docs.pages import ROOT
 
 RESULTS = ROOT / "docs" / "results"
-SCRIPTS = ("tables", "selection", "roles")
+SCRIPTS = ("tables", "selection", "roles", "levers")
 
 
 @pytest.fixture
@@ -31,14 +31,14 @@ def test_an_interval_is_student_s(scripts):
 
 
 def test_selectors_are_compared_population_by_population(scripts):
-    _, selection, _ = scripts
+    _, selection, *_ = scripts
     elos = pd.DataFrame({"berteam": [1010.0, 1110.0], "uniform": [1000.0, 1100.0]}, index=["a", "b"])
     elos.index.name = "population"
     assert "| berteam - uniform | 2 | 10 ± 0 |" in selection.compared(elos)
 
 
 def test_roles_are_what_members_add_to_their_teams(scripts):
-    *_, roles = scripts
+    *_, roles, _ = scripts
     rng = np.random.default_rng(0)
     grabs, tags = np.array([0.5, 0.0, 0.25]), np.array([0.0, 2.0, 1.0])
     teams = {side: rng.integers(3, size=(40, 2)) for side in ("blue", "red")}
@@ -53,6 +53,22 @@ def test_roles_are_what_members_add_to_their_teams(scripts):
     late = np.concatenate([of[10:] for of in teams.values()])
     assert found["share of places"].to_list() == pytest.approx(np.bincount(late.ravel(), minlength=3) / late.size)
     assert "| 1 | " in roles.shown(found)
+
+
+@pytest.mark.filterwarnings("ignore:Computation of the confidence interval")  # which says that percent
+def test_one_lever_is_compared_as_student_does_and_more_of_them_more_carefully(scripts):
+    *_, levers = scripts
+    control, same, other = [
+        pd.DataFrame(dict.fromkeys(levers.COMPARED, x)) for x in ([8.0, 10.0, 12.0], [9.0, 11.0], [40.0, 42.0])
+    ]
+    # Pooled variance (8 + 2) / 3, t of 3 degrees of freedom 3.182: 3.182 · √(10 / 3 · (1/3 + 1/2)) = 5.30.
+    (alone,) = levers.differences(control, {"same": same})["won"]
+    assert alone.startswith("+0.00 ± ")
+    assert float(alone.split()[-1]) == pytest.approx(5.30, rel=0.02)  # SciPy finds the quantile to a percent or so
+    both = levers.differences(control, {"same": same, "other": other, "not done": same[:1]})
+    assert both["variant"].to_list() == ["`same`", "`other`"]
+    assert both["lost"][1].startswith("**+31.00 ± ")
+    assert float(both["won"][0].split(" ± ")[1]) > 3.9  # 3.182 · √(7 / 3 · 5 / 6) = 3.92, were they compared one by one
 
 
 def test_the_sweeps_can_be_run():

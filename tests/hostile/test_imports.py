@@ -41,9 +41,9 @@ def test_a_report_says_what_it_did_not_import(run, berteam):
 
 
 def test_going_on_with_ones_own_words_needs_no_trust(run, berteam):
-    changed(run("sailors"), "reward: custom_rew2", "reward: own:pay")
-    Path("own.py").write_text("def pay(terms, before, after):\n    return 1.0\n")
-    berteam("train", *RUNS["sailors"], "env.reward=own:pay", "out=run", "on_exists=resume", "epochs=2")
+    changed(run("sailors"), "reward: custom_rew2", "reward: earned:pay")
+    Path("earned.py").write_text("def pay(terms, before, after):\n    return 1.0\n")
+    berteam("train", *RUNS["sailors"], "env.reward=earned:pay", "out=run", "on_exists=resume", "epochs=2")
 
 
 def test_figures_go_to_no_address_that_a_folder_names(run, berteam):
