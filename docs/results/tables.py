@@ -68,8 +68,8 @@ def replayed(folder: Path) -> float:
     return float(pd.read_csv(path).set_index("quantity").value["best_elo_replayed"])
 
 
-def of_sweep(folder: Path) -> pd.DataFrame:
-    """Returns one row a variant of all jobs in ``folder`` that are done."""
+def variants(folder: Path) -> dict[str, pd.DataFrame]:
+    """Returns for each variant the figures of its jobs in ``folder`` that are done, a row each."""
     sweep = Sweep.read(folder)
     common = set.intersection(*(set(words) for words in sweep.jobs.values()))
     found: dict[str, list[dict[str, float]]] = {}
@@ -78,10 +78,14 @@ def of_sweep(folder: Path) -> pd.DataFrame:
         of_variant = found.setdefault(" ".join(own) or "as it is", [])
         if sweep.status(job)[0] == "done":
             of_variant.append(of_job(folder / str(job)))
+    return {variant: pd.DataFrame(figures, columns=list(HEAD[2:])) for variant, figures in found.items()}
+
+
+def of_sweep(folder: Path) -> pd.DataFrame:
+    """Returns one row a variant of all jobs in ``folder`` that are done."""
     rows = []
-    for variant, figures in found.items():
-        columns = {x: np.array([figure[x] for figure in figures]) for x in HEAD[2:]}
-        said = [spoken(values, 2 if x in SHARES else 0) for x, values in columns.items()]
+    for variant, figures in variants(folder).items():
+        said = [spoken(figures[x].to_numpy(), 2 if x in SHARES else 0) for x in figures]
         rows.append([f"`{variant}`", str(len(figures)), *said])
     return pd.DataFrame(rows, columns=list(HEAD))
 
