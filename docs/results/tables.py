@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -69,16 +70,16 @@ def replayed(folder: Path) -> float:
 
 
 def variants(folder: Path) -> dict[str, pd.DataFrame]:
-    """Returns for each variant the figures of its jobs in ``folder`` that are done, a row each."""
+    """Returns for each variant, named by what it says that most jobs do not, the figures of its jobs that are done."""
     sweep = Sweep.read(folder)
-    common = set.intersection(*(set(words) for words in sweep.jobs.values()))
+    said = Counter(word for words in sweep.jobs.values() for word in words)
     found: dict[str, list[dict[str, float]]] = {}
     for job, words in sweep.jobs.items():
-        own = [x for x in words if x not in common and not x.startswith("seed=")]
+        own = [x for x in words if said[x] <= len(sweep.jobs) / 2 and not x.startswith("seed=")]
         of_variant = found.setdefault(" ".join(own) or "as it is", [])
         if sweep.status(job)[0] == "done":
             of_variant.append(of_job(folder / str(job)))
-    return {variant: pd.DataFrame(figures, columns=list(HEAD[2:])) for variant, figures in found.items()}
+    return {variant: pd.DataFrame(figures, columns=list(HEAD[2:]), dtype=float) for variant, figures in found.items()}
 
 
 def of_sweep(folder: Path) -> pd.DataFrame:

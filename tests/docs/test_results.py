@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from berteam_cli.compose import check, prepare
+from berteam_cli.sweep.folder import Sweep
 from tests.docs.pages import ROOT
 
 RESULTS = ROOT / "docs" / "results"
@@ -28,6 +29,14 @@ def test_an_interval_is_student_s(scripts):
     assert tables.spoken(np.array([1.0, 2.0, 3.0]), 2) == "2.00 ± 2.48"
     assert tables.spoken(np.array([7.0, np.nan])) == "7"
     assert tables.spoken(np.array([np.nan])) == ""
+
+
+def test_a_variant_is_named_by_what_most_jobs_do_not_say(scripts, tmp_path):
+    tables, *_ = scripts
+    lists = [["epochs=9"], ["epochs=9", "x=1"], ["epochs=4"]]
+    Sweep(tmp_path, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
+    assert list(tables.variants(tmp_path)) == ["as it is", "x=1", "epochs=4"]
+    assert tables.of_sweep(tmp_path)["seeds"].to_list() == ["0", "0", "0"]
 
 
 def test_selectors_are_compared_population_by_population(scripts):
