@@ -1,8 +1,8 @@
-"""Compares what levers do with the setting as it is: python docs/results/levers.py CONTROL FOLDER.
+"""Compares what levers do with the setting as it is: python docs/results/levers.py CONTROL FOLDER ...
 
-CONTROL is of a sweep over seeds alone, as of control.yaml, FOLDER of one with a lever in each variant, as of
-ablations.yaml. Prints the mean difference of each variant to the control, with intervals that hold for all variants at
-once with 95 % (Dunnett's test, which takes the spread over seeds for the same everywhere).
+CONTROL is of a sweep that has the setting as it is, as of control.yaml, a FOLDER of one with a lever in each variant,
+as of ablations.yaml and small.yaml. Prints the mean difference of each variant to the control, with intervals that hold
+for all variants at once with 95 % (Dunnett's test, which takes the spread over seeds for the same everywhere).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from scipy.stats import dunnett
-from tables import SHARES, markdown, variants
+from tables import AS_IT_IS, SHARES, markdown, variants
 
 COMPARED = ("expected Elo", "won", "lost", "own games decided")
 
@@ -40,5 +40,7 @@ def differences(control: pd.DataFrame, found: dict[str, pd.DataFrame]) -> pd.Dat
 
 
 if __name__ == "__main__":
-    (control,) = variants(Path(sys.argv[1])).values()
-    print(markdown(differences(control, variants(Path(sys.argv[2])))))
+    control = variants(Path(sys.argv[1]))[AS_IT_IS]
+    found = {variant: figures for name in sys.argv[2:] for variant, figures in variants(Path(name)).items()}
+    found.pop(AS_IT_IS, None)
+    print(markdown(differences(control, found)))

@@ -24,6 +24,7 @@ HEAD = (
     *("variant", "seeds", "expected Elo", "best team", "best member", "highest expected on the way"),
     *("won", "drawn", "lost", "own games decided", "first capture"),
 )
+AS_IT_IS = "as it is"  # the variant that says nothing of its own
 SHARES = ("won", "drawn", "lost", "own games decided")
 
 
@@ -76,7 +77,7 @@ def variants(folder: Path) -> dict[str, pd.DataFrame]:
     found: dict[str, list[dict[str, float]]] = {}
     for job, words in sweep.jobs.items():
         own = [x for x in words if said[x] <= len(sweep.jobs) / 2 and not x.startswith("seed=")]
-        of_variant = found.setdefault(" ".join(own) or "as it is", [])
+        of_variant = found.setdefault(" ".join(own) or AS_IT_IS, [])
         if sweep.status(job)[0] == "done":
             of_variant.append(of_job(folder / str(job)))
     return {variant: pd.DataFrame(figures, columns=list(HEAD[2:]), dtype=float) for variant, figures in found.items()}
