@@ -51,6 +51,7 @@ def broken(terms, before, after):
 def machines():
     """Two machines of one processor each; RAY_ADDRESS is theirs."""
     ray = pytest.importorskip("ray", reason=MISSING)
+    from ray._private.authentication_test_utils import reset_auth_token_state  # noqa: PLC0415 (an extra)
     from ray.cluster_utils import Cluster as Machines  # noqa: PLC0415 (an extra)
 
     folder = tempfile.mkdtemp(prefix="ray")  # short, as sockets want it
@@ -58,7 +59,7 @@ def machines():
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         patch.setenv("RAY_AUTH_TOKEN", secrets.token_hex())  # else Ray keeps one in the user's home
         patch.setenv("RAY_AUTH_MODE", "token")
-        read_authentication()
+        reset_auth_token_state()  # Ray keeps those of the first Ray of a process, whichever test started that
         head = {**QUIET, "temp_dir": folder}
         made = Machines(initialize_head=True, head_node_args=head)
         try:
@@ -69,15 +70,7 @@ def machines():
             ray.shutdown()
             made.shutdown()
             shutil.rmtree(folder, ignore_errors=True)
-    read_authentication()
-
-
-def read_authentication():
-    """Lets Ray read mode and token anew: it keeps those of the first Ray of a process, whichever test started that."""
-    from ray._raylet import AuthenticationTokenLoader, Config  # noqa: PLC0415 (an extra)
-
-    Config.initialize("")
-    AuthenticationTokenLoader.instance().reset_cache()
+    reset_auth_token_state()
 
 
 def raylet(machine):
