@@ -63,7 +63,7 @@ results: setup ## docs/results.md, small: five levers, three seeds, and selector
 	$(BIN)/berteam sweep docs/results/small.yaml $(BOTH) hydra.sweep.dir=$(SMALL)/levers
 	$(BIN)/berteam sweep docs/results/selection.yaml $(BOTH) hydra.sweep.dir=$(SMALL)/selection epochs=100 evaluation.games=2800 evaluation.games_per_pair=10 population.run=$(SMALL)/levers/0,$(SMALL)/levers/1,$(SMALL)/levers/2
 	$(BIN)/python docs/results/tables.py $(SMALL)/levers
-	$(BIN)/python docs/results/levers.py $(SMALL)/levers $(SMALL)/levers
+	$(BIN)/python docs/results/levers.py $(SMALL)/levers
 	$(BIN)/python docs/results/selection.py $(SMALL)/selection
 
 reference: setup ## the Elos of the fixed teams that the package ships

@@ -1,8 +1,9 @@
-"""Compares what levers do with the setting as it is: python docs/results/levers.py CONTROL FOLDER ...
+"""Compares what levers do with the setting as it is: python docs/results/levers.py FOLDER ...
 
-CONTROL is of a sweep that has the setting as it is, as of control.yaml, a FOLDER of one with a lever in each variant,
-as of ablations.yaml and small.yaml. Prints the mean difference of each variant to the control, with intervals that hold
-for all variants at once with 95 % (Dunnett's test, which takes the spread over seeds for the same everywhere).
+The first FOLDER is of a sweep that has the setting as it is, as of control.yaml or small.yaml; it and the others have a
+lever in each other variant, as of ablations.yaml. Prints the mean difference of each variant to the setting as it is,
+with intervals that hold for all variants at once with 95 % (Dunnett's test, which takes the spread over seeds for the
+same everywhere).
 """
 
 from __future__ import annotations
@@ -40,7 +41,6 @@ def differences(control: pd.DataFrame, found: dict[str, pd.DataFrame]) -> pd.Dat
 
 
 if __name__ == "__main__":
-    control = variants(Path(sys.argv[1]))[AS_IT_IS]
-    found = {variant: figures for name in sys.argv[2:] for variant, figures in variants(Path(name)).items()}
-    found.pop(AS_IT_IS, None)
-    print(markdown(differences(control, found)))
+    folders = [variants(Path(name)) for name in sys.argv[1:]]
+    found = {variant: figures for folder in folders for variant, figures in folder.items() if variant != AS_IT_IS}
+    print(markdown(differences(folders[0][AS_IT_IS], found)))

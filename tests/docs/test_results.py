@@ -80,6 +80,11 @@ def test_one_lever_is_compared_as_student_does_and_more_of_them_more_carefully(s
     assert float(both["won"][0].split(" ± ")[1]) > 3.9  # 3.182 · √(7 / 3 · 5 / 6) = 3.92, were they compared one by one
 
 
+def test_levers_are_compared_at_one_size():
+    plans = [yaml.safe_load((RESULTS / f"{name}.yaml").read_text()) for name in ("control", "ablations", "small")]
+    assert plans[0]["overrides"] == plans[1]["overrides"] == plans[2]["overrides"]
+
+
 def test_the_sweeps_can_be_run():
     prepare()
     for path in sorted(RESULTS.glob("*.yaml")):
