@@ -21,6 +21,7 @@ from berteam_cli.records import COLUMNS, cell
 TABLE, JOBS, LOCKS = "sweep.csv", "sweep.json", ".locks"
 SCHEMA = 1
 WAIT_S = 5.0  # longer than anybody holds a lock who only looks whether it is held
+GLANCE_S = 0.05  # two who only look seldom hinder each other so long
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,13 @@ class Sweep:
         It is waiting, running, done, failed, refused (its settings do not go together) or interrupted.
         """
         folder = self.folder / str(job)
-        try:
-            facts = read_manifest(folder)
-        except InputError:
-            facts = {}
+        with unheld(folder) as free:  # while it is read nobody begins or ends it, or else it is running
+            try:
+                facts = read_manifest(folder)
+            except InputError:
+                facts = {}
         status = str(facts.get("status", "waiting"))
-        if status != "done" and at_work(folder):
+        if status != "done" and not free:
             status = "running"
         elif status == "running":  # nobody is: whoever was got killed
             status = "interrupted"
@@ -168,14 +170,16 @@ def working(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def at_work(folder: Path) -> bool:
-    """Returns whether some process is at work on the job in ``folder``."""
-    if not (folder.parent / LOCKS / folder.name).exists():
-        return False
+@contextmanager
+def unheld(folder: Path) -> Iterator[bool]:
+    """Keeps others from the job in ``folder`` if none is at work there, and yields whether that is so."""
     lock = lock_of(folder)
     try:
-        lock.acquire(blocking=False)
+        lock.acquire(timeout=GLANCE_S, poll_interval=GLANCE_S / 10)
     except Timeout:
-        return True
-    lock.release()
-    return False
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        lock.release()

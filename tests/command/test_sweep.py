@@ -5,11 +5,14 @@ import re
 import shutil
 import signal
 import subprocess
+import threading
 import time
+from collections import Counter
 
 import pandas as pd
 import pytest
 
+from berteam_cli.folder import Manifest
 from berteam_cli.sweep.folder import Sweep, working
 from berteam_cli.sweep.job import cores_each
 from berteam_cli.sweep.plan import NEEDS, spelt
@@ -75,6 +78,37 @@ def test_a_job_that_fails_elsewhere_is_told_here(berteam, tmp_path, launcher, se
     assert "seed=1): The run failed: NotADirectoryError" in failed.stderr
     assert "1 runs of the sweep failed" in failed.stderr
     assert list(table(tmp_path / "sweep").status) == ["done", "failed"]
+
+
+def test_a_job_that_ends_is_not_seen_half_ended(tmp_path):
+    """Its holder writes that it failed before why, and is found at any moment of that."""
+    sweep = Sweep(tmp_path, "train", {0: []})
+    sweep.keep()
+    (tmp_path / "0").mkdir()
+    ended, seen = threading.Event(), Counter()
+
+    def look():
+        while not ended.is_set():
+            status, facts = sweep.status(0)
+            seen[status, facts.get("error", "")] += 1
+
+    def end_over_and_over():
+        for _ in range(300):
+            with working(tmp_path / "0"):
+                manifest = Manifest.begun(tmp_path / "0", error="")
+                manifest.add(status="failed")
+                manifest.add(error="the disk is full")
+
+    watcher = threading.Thread(target=look)
+    watcher.start()
+    try:
+        end_over_and_over()
+    finally:
+        ended.set()
+        watcher.join()
+    assert ("failed", "the disk is full") in seen
+    assert ("failed", "") not in seen
+    assert {status for status, _ in seen} <= {"waiting", "running", "failed"}  # never as if it had been killed
 
 
 def test_killed_in_the_middle_and_resumed(berteam, tmp_path):
