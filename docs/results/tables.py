@@ -70,17 +70,23 @@ def replayed(folder: Path) -> float:
     return float(pd.read_csv(path).set_index("quantity").value["best_elo_replayed"])
 
 
-def variants(folder: Path) -> dict[str, pd.DataFrame]:
-    """Returns for each variant, named by what it says that most jobs do not, the figures of its jobs that are done."""
+def variant_jobs(folder: Path) -> dict[str, list[Path]]:
+    """Returns for each variant, named by what it says that most jobs do not, the folders of its jobs that are done."""
     sweep = Sweep.read(folder)
     said = Counter(word for words in sweep.jobs.values() for word in words)
-    found: dict[str, list[dict[str, float]]] = {}
+    found: dict[str, list[Path]] = {}
     for job, words in sweep.jobs.items():
         own = [x for x in words if said[x] <= len(sweep.jobs) / 2 and not x.startswith("seed=")]
         of_variant = found.setdefault(" ".join(own) or AS_IT_IS, [])
         if sweep.status(job)[0] == "done":
-            of_variant.append(of_job(folder / str(job)))
-    return {variant: pd.DataFrame(figures, columns=list(HEAD[2:]), dtype=float) for variant, figures in found.items()}
+            of_variant.append(folder / str(job))
+    return found
+
+
+def variants(folder: Path) -> dict[str, pd.DataFrame]:
+    """Returns for each variant the figures of its jobs that are done."""
+    figures = {variant: [of_job(job) for job in jobs] for variant, jobs in variant_jobs(folder).items()}
+    return {variant: pd.DataFrame(rows, columns=list(HEAD[2:]), dtype=float) for variant, rows in figures.items()}
 
 
 def of_sweep(folder: Path) -> pd.DataFrame:

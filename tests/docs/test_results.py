@@ -12,7 +12,7 @@ from berteam_cli.sweep.folder import Sweep
 from tests.docs.pages import ROOT
 
 RESULTS = ROOT / "docs" / "results"
-SCRIPTS = ("tables", "selection", "roles", "levers")
+SCRIPTS = ("tables", "selection", "roles", "levers", "curves")
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_selectors_are_compared_population_by_population(scripts):
 
 
 def test_roles_are_what_members_add_to_their_teams(scripts):
-    *_, roles, _ = scripts
+    _, _, roles, *_ = scripts
     rng = np.random.default_rng(0)
     grabs, tags = np.array([0.5, 0.0, 0.25]), np.array([0.0, 2.0, 1.0])
     teams = {side: rng.integers(3, size=(40, 2)) for side in ("blue", "red")}
@@ -66,7 +66,7 @@ def test_roles_are_what_members_add_to_their_teams(scripts):
 
 @pytest.mark.filterwarnings("ignore:Computation of the confidence interval")  # which says that percent
 def test_one_lever_is_compared_as_student_does_and_more_of_them_more_carefully(scripts):
-    *_, levers = scripts
+    *_, levers, _ = scripts
     control, same, other = [
         pd.DataFrame(dict.fromkeys(levers.COMPARED, x)) for x in ([8.0, 10.0, 12.0], [9.0, 11.0], [40.0, 42.0])
     ]
@@ -94,3 +94,29 @@ def test_the_sweeps_can_be_run():
             first = [f"{key}={values[0]}" for key, values in plan.get("sweep", {}).items()]
             config = check("train", [*plan["overrides"], *variant, *first], lambda config, keys: None)
             assert config.evaluation.games_per_pair > 0
+
+
+def test_a_long_run_is_shown_at_looks_that_fit_with_the_last(scripts):
+    *_, curves = scripts
+    assert curves.shown([0, 100, 200]) == [0, 100, 200]
+    assert curves.shown(list(range(0, 2100, 100))) == list(range(0, 2100, 200))
+    assert curves.shown([0, *range(100, 1200, 100), 1150]) == [0, *range(200, 1200, 200), 1150]
+
+
+def test_a_run_s_course_is_that_of_its_looks_and_of_the_games_between(scripts, tmp_path):
+    *_, curves = scripts
+    looks = {"epoch": [0, 2, 4], "who": "choice", "opponent": "all", "games": 10, "wins": [0, 1, 3], "draws": [4, 5, 6]}
+    both = [
+        pd.DataFrame(looks | {"elo": [800.0, 850.0, 900.0]}),
+        pd.DataFrame(looks | {"who": "best_team", "elo": 1.0}),
+    ]
+    pd.concat(both).to_csv(tmp_path / "evaluation.csv")
+    games = {"epoch": [1, 2, 3, 4], "blue_score": [0.5, 1.0, 0.5, 0.5], "blue_grabs": [0, 1, 0, 2], "red_grabs": 1}
+    pd.DataFrame(games).to_csv(tmp_path / "games.csv")
+    elo, won, drawn, own_drawn, grabs = curves.of_run(tmp_path).to_numpy().T
+    assert elo.tolist() == [800.0, 850.0, 900.0]
+    assert won.tolist() == [0.0, 0.1, 0.3]
+    assert drawn.tolist() == [0.4, 0.5, 0.6]
+    assert own_drawn[1:].tolist() == [0.5, 1.0]
+    assert np.isnan(own_drawn[0])  # no game before the first look
+    assert grabs[1:].tolist() == [1.5, 2.0]
