@@ -10,6 +10,7 @@ from typing import Any
 from hydra import compose, initialize_config_module
 from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
+from hydra.core.object_type import ObjectType
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep, Override
 from hydra.core.plugins import Plugins
@@ -264,11 +265,13 @@ def choices(group: str, searched: list[str] | None = None) -> list[str]:
         searched: overrides that add folders to search.
     """
     first = re.split("[/@]", group, maxsplit=1)[0]
-    # Asking Hydra for the choices of a group takes a tenth of a second, which most keys need not cost.
+    # Asking Hydra for the choices of a group takes a twentieth of a second, which most keys need not cost.
     if first == "schema" or not (searched or first in {*groups(), "hydra"}):
         return []
-    loader = GlobalHydra.instance().config_loader()
+    loader: Any = GlobalHydra.instance().config_loader()
     try:
+        if not searched:  # then Hydra need not copy all that it has registered to add to it
+            return sorted(loader.repository.get_group_options(group, ObjectType.CONFIG))
         return sorted(loader.get_group_options(group, config_name="train", overrides=searched))
     except OSError:  # no file can have that name
         return []
