@@ -5,6 +5,7 @@ Schemas have types and bounds, no values; the values stand in conf/, one yaml fo
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import fields
 from typing import Any
@@ -73,6 +74,7 @@ SCHEMAS: dict[str, dict[str, type]] = {
 }
 
 
+@functools.cache  # Hydra keeps them as long as the process
 def register() -> None:
     """Puts the schemas where the yaml files name them: /schema/<group>/<name>."""
     store = ConfigStore.instance()
