@@ -53,13 +53,20 @@ def keys(command: str, chosen: Mapping[str, str]) -> dict[str, bool]:
     taken = dict(entry for entry in defaults(content) if entry[0] in there)
     experiment = chosen.get("experiment", "")
     if experiment in choices("experiment"):
-        changed = read(CONF / "experiment" / f"{experiment}.yaml")
-        taken |= {group.removeprefix("override /"): option for group, option in defaults(changed)}
+        taken |= chosen_by(experiment)
     taken |= {group: option for group, option in chosen.items() if group in taken}
     content.pop("hydra", None)
     for group, option in taken.items():
         content[group] = whole(group, option)
     return dict(dotted(content))
+
+
+def chosen_by(experiment: str) -> dict[str, str]:
+    """Returns the choices by group that an experiment makes, with those of the one that it begins with."""
+    made = dict[str, str]()
+    for group, option in defaults(read(CONF / "experiment" / f"{experiment}.yaml")):
+        made |= {group.removeprefix("override /"): option} if group else chosen_by(option)
+    return made
 
 
 def whole(group: str, option: str) -> dict[str, Any]:

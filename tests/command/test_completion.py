@@ -81,7 +81,12 @@ def test_an_answer_imports_nothing_slow():
 
 def test_the_catalogue_is_what_hydra_finds():
     lines = [("train", []), ("train", ["selector=mcaa", "population=mixed4x3", "env=mctf_2025"])]
-    lines += [("train", ["experiment=unknown_opponent"]), ("tournament", []), ("compare", ["runs=[a]"])]
+    lines += [
+        ("train", ["experiment=unknown_opponent"]),
+        ("train", ["experiment=strong_night"]),
+        ("tournament", []),
+        ("compare", ["runs=[a]"]),
+    ]
     prepare()
     with initialize_config_module(CONF, version_base="1.3"):
         assert [choices(group) for group in catalogue.groups()] == [catalogue.choices(x) for x in catalogue.groups()]
