@@ -92,17 +92,14 @@ def test_a_job_that_ends_is_not_seen_half_ended(tmp_path):
             status, facts = sweep.status(0)
             seen[status, facts.get("error", "")] += 1
 
-    def end_over_and_over():
+    watcher = threading.Thread(target=look)
+    watcher.start()
+    try:
         for _ in range(300):
             with working(tmp_path / "0"):
                 manifest = Manifest.begun(tmp_path / "0", error="")
                 manifest.add(status="failed")
                 manifest.add(error="the disk is full")
-
-    watcher = threading.Thread(target=look)
-    watcher.start()
-    try:
-        end_over_and_over()
     finally:
         ended.set()
         watcher.join()

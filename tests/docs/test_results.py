@@ -1,6 +1,7 @@
 """What docs/results/ says of sweeps, and that its sweeps are of this version's keys."""
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -18,36 +19,32 @@ SCRIPTS = ("tables", "selection", "roles", "levers", "curves")
 @pytest.fixture
 def scripts(monkeypatch):
     monkeypatch.syspath_prepend(str(RESULTS))
-    yield tuple(__import__(name) for name in SCRIPTS)
+    yield SimpleNamespace(**{name: __import__(name) for name in SCRIPTS})
     for name in SCRIPTS:
         sys.modules.pop(name)
 
 
 def test_an_interval_is_student_s(scripts):
-    tables, *_ = scripts
     # Mean 2, deviation 1, t of 2 degrees of freedom 4.303: 4.303 / √3 = 2.484.
-    assert tables.spoken(np.array([1.0, 2.0, 3.0]), 2) == "2.00 ± 2.48"
-    assert tables.spoken(np.array([7.0, np.nan])) == "7"
-    assert tables.spoken(np.array([np.nan])) == ""
+    assert scripts.tables.spoken(np.array([1.0, 2.0, 3.0]), 2) == "2.00 ± 2.48"
+    assert scripts.tables.spoken(np.array([7.0, np.nan])) == "7"
+    assert scripts.tables.spoken(np.array([np.nan])) == ""
 
 
 def test_a_variant_is_named_by_what_most_jobs_do_not_say(scripts, tmp_path):
-    tables, *_ = scripts
     lists = [["epochs=9"], ["epochs=9", "x=1"], ["epochs=4"]]
     Sweep(tmp_path, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
-    assert list(tables.variants(tmp_path)) == ["as it is", "x=1", "epochs=4"]
-    assert tables.of_sweep(tmp_path)["seeds"].to_list() == ["0", "0", "0"]
+    assert list(scripts.tables.variants(tmp_path)) == ["as it is", "x=1", "epochs=4"]
+    assert scripts.tables.of_sweep(tmp_path)["seeds"].to_list() == ["0", "0", "0"]
 
 
 def test_selectors_are_compared_population_by_population(scripts):
-    _, selection, *_ = scripts
     elos = pd.DataFrame({"berteam": [1010.0, 1110.0], "uniform": [1000.0, 1100.0]}, index=["a", "b"])
     elos.index.name = "population"
-    assert "| berteam - uniform | 2 | 10 ± 0 |" in selection.compared(elos)
+    assert "| berteam - uniform | 2 | 10 ± 0 |" in scripts.selection.compared(elos)
 
 
 def test_roles_are_what_members_add_to_their_teams(scripts):
-    _, _, roles, *_ = scripts
     rng = np.random.default_rng(0)
     grabs, tags = np.array([0.5, 0.0, 0.25]), np.array([0.0, 2.0, 1.0])
     teams = {side: rng.integers(3, size=(40, 2)) for side in ("blue", "red")}
@@ -55,26 +52,25 @@ def test_roles_are_what_members_add_to_their_teams(scripts):
     for side, of in teams.items():
         games[f"{side}_grabs"], games[f"{side}_tags"] = grabs[of].sum(axis=1), tags[of].sum(axis=1)
         games[f"{side}_captures"], games[f"{side}_score"] = 0.0, 0.5
-    found = roles.roles(games[games.index >= 10])
+    found = scripts.roles.roles(games[games.index >= 10])
     assert found["grabs"].to_list() == pytest.approx(grabs)
     assert found["tags"].to_list() == pytest.approx(tags, abs=1e-12)
     assert found["score"].to_list() == pytest.approx([0.25] * 3)
     late = np.concatenate([of[10:] for of in teams.values()])
     assert found["share of places"].to_list() == pytest.approx(np.bincount(late.ravel(), minlength=3) / late.size)
-    assert "| 1 | " in roles.shown(found)
+    assert "| 1 | " in scripts.roles.shown(found)
 
 
 @pytest.mark.filterwarnings("ignore:Computation of the confidence interval")  # which says that percent
 def test_one_lever_is_compared_as_student_does_and_more_of_them_more_carefully(scripts):
-    *_, levers, _ = scripts
     control, same, other = [
-        pd.DataFrame(dict.fromkeys(levers.COMPARED, x)) for x in ([8.0, 10.0, 12.0], [9.0, 11.0], [40.0, 42.0])
+        pd.DataFrame(dict.fromkeys(scripts.levers.COMPARED, x)) for x in ([8.0, 10.0, 12.0], [9.0, 11.0], [40.0, 42.0])
     ]
     # Pooled variance (8 + 2) / 3, t of 3 degrees of freedom 3.182: 3.182 · √(10 / 3 · (1/3 + 1/2)) = 5.30.
-    (alone,) = levers.differences(control, {"same": same})["won"]
+    (alone,) = scripts.levers.differences(control, {"same": same})["won"]
     assert alone.startswith("+0.00 ± ")
     assert float(alone.split()[-1]) == pytest.approx(5.30, rel=0.02)  # SciPy finds the quantile to a percent or so
-    both = levers.differences(control, {"same": same, "other": other, "not done": same[:1]})
+    both = scripts.levers.differences(control, {"same": same, "other": other, "not done": same[:1]})
     assert both["variant"].to_list() == ["`same`", "`other`"]
     assert both["lost"][1].startswith("**+31.00 ± ")
     assert float(both["won"][0].split(" ± ")[1]) > 3.9  # 3.182 · √(7 / 3 · 5 / 6) = 3.92, were they compared one by one
@@ -97,14 +93,12 @@ def test_the_sweeps_can_be_run():
 
 
 def test_a_long_run_is_shown_at_looks_that_fit_with_the_last(scripts):
-    *_, curves = scripts
-    assert curves.shown([0, 100, 200]) == [0, 100, 200]
-    assert curves.shown(list(range(0, 2100, 100))) == list(range(0, 2100, 200))
-    assert curves.shown([0, *range(100, 1200, 100), 1150]) == [0, *range(200, 1200, 200), 1150]
+    assert scripts.curves.shown([0, 100, 200]) == [0, 100, 200]
+    assert scripts.curves.shown(list(range(0, 2100, 100))) == list(range(0, 2100, 200))
+    assert scripts.curves.shown([0, *range(100, 1200, 100), 1150]) == [0, *range(200, 1200, 200), 1150]
 
 
 def test_a_run_s_course_is_that_of_its_looks_and_of_the_games_between(scripts, tmp_path):
-    *_, curves = scripts
     looks = {"epoch": [0, 2, 4], "who": "choice", "opponent": "all", "games": 10, "wins": [0, 1, 3], "draws": [4, 5, 6]}
     both = [
         pd.DataFrame(looks | {"elo": [800.0, 850.0, 900.0]}),
@@ -113,7 +107,7 @@ def test_a_run_s_course_is_that_of_its_looks_and_of_the_games_between(scripts, t
     pd.concat(both).to_csv(tmp_path / "evaluation.csv")
     games = {"epoch": [1, 2, 3, 4], "blue_score": [0.5, 1.0, 0.5, 0.5], "blue_grabs": [0, 1, 0, 2], "red_grabs": 1}
     pd.DataFrame(games).to_csv(tmp_path / "games.csv")
-    elo, won, drawn, own_drawn, grabs = curves.of_run(tmp_path).to_numpy().T
+    elo, won, drawn, own_drawn, grabs = scripts.curves.of_run(tmp_path).to_numpy().T
     assert elo.tolist() == [800.0, 850.0, 900.0]
     assert won.tolist() == [0.0, 0.1, 0.3]
     assert drawn.tolist() == [0.4, 0.5, 0.6]
