@@ -13,7 +13,7 @@ from berteam_cli.acting import Policies, fixed_policies
 from berteam_cli.outcomes import NOBODY, Floats, Ints, Lineups, Outcomes
 from berteam_cli.population import Population
 
-PAST, SCRIPTED, EXPLOITER = "past", "scripted", "exploiter"  # what an opponent is
+PAST, PAST_EXPLOITER, SCRIPTED, EXPLOITER = "past", "past_exploiter", "scripted", "exploiter"  # what an opponent is
 
 Choose = Callable[[int, Generator], Lineups]
 """Returns the line-ups of so many games as the selector makes them."""
@@ -23,7 +23,7 @@ class Guest(NamedTuple):
     """The team of one game that the selector did not choose.
 
     Attributes:
-        kind: PAST, SCRIPTED or EXPLOITER.
+        kind: PAST, PAST_EXPLOITER, SCRIPTED or EXPLOITER.
         name: of the team, as opponents.csv writes it.
         side: where it stands.
         epoch: after which its members were frozen; NOBODY where they were not.

@@ -12,7 +12,7 @@ import torch
 from numpy.random import Generator
 
 from berteam_cli.acting import Policies, fixed_policies, joined
-from berteam_cli.opponents.base import EXPLOITER, PAST, Choose, Guest, Guests, Met, hosted
+from berteam_cli.opponents.base import EXPLOITER, PAST, PAST_EXPLOITER, Choose, Guest, Guests, Met, hosted
 from berteam_cli.opponents.exploiters import Attempt, Exploiters, anew
 from berteam_cli.opponents.past import Past, Snapshot, taken, thinned
 from berteam_cli.opponents.record import Record
@@ -122,7 +122,7 @@ class League:
 
         pool, attempts = state.pool, state.attempts
         if self.past:
-            pool = tuple(replace(x, record=after(x.record, self.past.half_life, PAST, *x.key)) for x in pool)
+            pool = tuple(replace(x, record=after(x.record, self.past.half_life, x.kind, *x.key)) for x in pool)
         if self.exploiters:
             life = self.exploiters.half_life
             attempts = tuple(replace(x, record=after(x.record, life, EXPLOITER, NOBODY, x.island)) for x in attempts)
@@ -130,7 +130,7 @@ class League:
 
     def standing(self, state: LeagueState, guest: Guest) -> tuple[float, float]:
         """Returns how likely such a guest would be drawn now, and the estimated chance to beat it; NaN if unknown."""
-        if guest.kind == PAST and self.past:
+        if guest.kind in {PAST, PAST_EXPLOITER} and self.past:
             chances = self.past.chances(state.pool)
             for snapshot, chance in zip(state.pool, chances, strict=True):
                 if snapshot.key == (guest.epoch, guest.island):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.acting import Policies
-from berteam_cli.opponents.base import PAST, Guest
+from berteam_cli.opponents.base import PAST, PAST_EXPLOITER, Guest
 from berteam_cli.opponents.record import Record
 from berteam_cli.optimizer.fitness import proportional
 from berteam_cli.outcomes import NOBODY, Floats, Ints
@@ -45,6 +45,11 @@ class Snapshot:
     def key(self) -> tuple[int, int]:
         """What tells it from others."""
         return self.epoch, self.island
+
+    @property
+    def kind(self) -> str:
+        """What a team of it is as an opponent."""
+        return PAST if self.island == NOBODY else PAST_EXPLOITER
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,7 @@ class Past:
             tables.append(chosen_rows(pool[k].policies, used))
         for k, row, side in zip(drawn, places, sides, strict=True):
             name = f"{pool[k].epoch}:{team_name(pool[k].members[row])}"
-            guests.append(Guest(PAST, name, int(side), *pool[k].key))
+            guests.append(Guest(pool[k].kind, name, int(side), *pool[k].key))
         return teams, tables, guests
 
     def chances(self, pool: Sequence[Snapshot]) -> Floats:
@@ -126,15 +131,21 @@ class Past:
 
 
 def thinned(pool: tuple[Snapshot, ...], most: int) -> tuple[Snapshot, ...]:
-    """Returns at most ``most`` snapshots of ``pool``, which is in order, evenly spread over its time.
+    """Returns at most ``most`` >= 2 snapshots of ``pool``, which is in order, each kind spread over its time.
 
-    As long as there are more, the one goes whose neighbours are nearest to each other, of several the oldest; the first
-    and the last stay.
+    A kind are the population's own snapshots, or those of one island of exploiters. As long as there are too many, the
+    one goes whose neighbours of its kind are nearest to each other, of several one of exploiters, and of these the
+    oldest. So exploiters that often begin anew push out each other, not the population's own past, whose first and last
+    stay.
     """
     kept = list(pool)
     while len(kept) > most:
-        gaps = [after.epoch - before.epoch for before, after in zip(kept, kept[2:], strict=False)]
-        del kept[1 + int(np.argmin(gaps))]
+        gaps = np.full(len(kept), np.inf)
+        for kind in {x.island for x in kept}:
+            alike = [k for k, x in enumerate(kept) if x.island == kind]
+            for before, k, after in zip(alike, alike[1:], alike[2:], strict=False):
+                gaps[k] = kept[after].epoch - kept[before].epoch
+        del kept[min(range(len(kept)), key=lambda k: (gaps[k], kept[k].island == NOBODY, k))]
     return tuple(kept)
 
 

@@ -56,13 +56,17 @@ def test_the_tables_of_a_league(whole, berteam, tmp_path):
     outsiders = {6, 7, 8}
     assert (games.groupby("epoch").size() == 6).all()
     assert not any(outsiders & {int(m) for m in team.split("-")} for team in [*games.blue, *games.red])
-    played = met.groupby(["epoch", "kind"]).games.sum().unstack()
-    assert (played.past == 3).all()
+    played = met.groupby(["epoch", "kind"]).games.sum().unstack(fill_value=0)
+    assert (played.past + played.past_exploiter == 3).all()
     assert (played.scripted == 1).all()
     assert (played.exploiter == 2).all()
     assert (met.wins + met.draws + met.losses == met.games).all()
     assert set(met[met.kind == "scripted"].opponent) == {"rock-rock"}
-    old = met[met.kind == "past"]
+    for kind, of_outsiders in (("past", False), ("past_exploiter", True)):
+        teams = [x.partition(":")[2] for x in met[met.kind == kind].opponent]
+        assert teams
+        assert all(bool(outsiders & {int(m) for m in team.split("-")}) == of_outsiders for team in teams)
+    old = met[met.kind.str.startswith("past")]
     assert (old.taken_epoch < old.epoch).all()
     assert (old.opponent.str.partition(":")[0].astype(int) == old.taken_epoch).all()
     assert old.chance.between(0, 1, inclusive="neither").sum() == old.chance.notna().sum() > 0

@@ -16,8 +16,8 @@ from tests.opponents.makers import parts
 ANY = random_networks(2, parts().games.env)
 
 
-def snapshot(number, *record):
-    return Snapshot(number, NOBODY, np.array([1, 4]), ANY, Record(*record))
+def snapshot(number, *record, island=NOBODY):
+    return Snapshot(number, island, np.array([1, 4]), ANY, Record(*record))
 
 
 def pool_settings(**changed):
@@ -80,6 +80,34 @@ def test_what_is_left_is_evenly_spread(most):
         assert (kept[0], kept[-1], len(kept)) == (0, number, min(most, number + 1))
         if number >= 2 * most:
             assert np.diff(kept).max() <= 2 * np.ceil(number / (most - 1))
+
+
+def test_each_kind_is_thinned_by_itself_by_hand():
+    def left(pool, most):
+        return [x.key for x in thinned(tuple(pool), most)]
+
+    own = [snapshot(number) for number in (0, 10, 30)]
+    # Gaps of its own kind: 30 around (10, own), 20 around (20, exploiters); the neighbours of another kind do not count.
+    mixed = [*own[:2], *(snapshot(number, island=1) for number in (10, 20, 30)), own[2]]
+    assert left(mixed, 5) == [(0, -1), (10, -1), (10, 1), (30, 1), (30, -1)]
+    assert left(mixed, 4) == [(0, -1), (10, 1), (30, 1), (30, -1)]
+    assert left(mixed, 2) == [(0, -1), (30, -1)]  # where all are ends, exploiters go first
+    alike = [own[0], own[1], snapshot(0, island=1), snapshot(10, island=1), snapshot(20, island=1), snapshot(20)]
+    assert left(alike, 5) == [(0, -1), (10, -1), (0, 1), (20, 1), (20, -1)]  # of equal gaps too
+
+
+def test_exploiters_that_often_begin_anew_leave_the_own_past_where_it_was():
+    """Half as long as an hour of experiment=strong: a snapshot every 25 epochs, exploiters' every 50 at most."""
+    rng, pool, again = np.random.default_rng(0), (snapshot(0),), 0
+    for number in range(1, 6001):
+        if number % 25 == 0:
+            pool = thinned((*pool, snapshot(number)), 40)
+        if number - again == 50 or rng.random() < 0.02:
+            pool, again = thinned((*pool, snapshot(number, island=1)), 40), number
+    own = np.array([x.epoch for x in pool if x.island == NOBODY])
+    assert (own[0], own[-1]) == (0, 6000)
+    assert 15 <= len(own) <= 25
+    assert np.diff(own).max() <= 2 * np.ceil(6000 / 15)
 
 
 def test_the_frozen_play_as_they_did_when_the_living_have_learnt():
