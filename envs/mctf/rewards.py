@@ -1,6 +1,7 @@
 """Rewards of one step, for every vehicle of a game: what happened, counted in terms, times the weights of a reward.
 
-In the first step of a game nothing counts as new, as there is nothing to compare with.
+What is new is so against the state before the step; by the rules' starts nothing can be new in the first one. There
+nobody comes nearer either, as in the original.
 """
 
 import math
@@ -260,30 +261,29 @@ def weight_of(reward: Reward, v: int, term: int) -> float:
 @part
 def happened(state: State, b: int, v: int, end: int, rules: Rules, out: np.ndarray) -> None:
     """Writes the terms of vehicle ``v`` to ``out``; ``end`` is as of ``finished``."""
-    first = state.steps[b] <= 1
     us = team_of(v, rules)
     them = 1 - us
     carries = state.has_flag[b, v]
-    carried = carries if first else state.was_carrying[b, v]
+    carried = state.was_carrying[b, v]
     tagged = state.is_tagged[b, v]
     target = state.tagged_opponent[b, v]
-    out[TEAM_CAPTURED] = state.capture[b, us] and not (first or state.was_capture[b, us])
-    out[OPPONENTS_CAPTURED] = state.capture[b, them] and not (first or state.was_capture[b, them])
-    out[TEAM_GRABBED] = state.pickup[b, us] and not (first or state.was_pickup[b, us])
-    out[OPPONENTS_GRABBED] = state.pickup[b, them] and not (first or state.was_pickup[b, them])
+    out[TEAM_CAPTURED] = state.capture[b, us] and not state.was_capture[b, us]
+    out[OPPONENTS_CAPTURED] = state.capture[b, them] and not state.was_capture[b, them]
+    out[TEAM_GRABBED] = state.pickup[b, us] and not state.was_pickup[b, us]
+    out[OPPONENTS_GRABBED] = state.pickup[b, them] and not state.was_pickup[b, them]
     out[GRABBED] = carries and not carried
     out[DROPPED] = carried and not carries and not state.capture[b, us]
     out[CARRIES] = carries
-    out[NEWLY_TAGGED] = tagged and not (first or state.was_tagged[b, v])
+    out[NEWLY_TAGGED] = tagged and not state.was_tagged[b, v]
     out[TAGGED] = tagged
     out[TAGGED_CARRIER] = tagged and carried
     out[TAGS] = target >= 0
     out[TAGS_CARRIER] = 0.0
     if target >= 0:
-        out[TAGS_CARRIER] = state.has_flag[b, target] if first else state.was_carrying[b, target]
+        out[TAGS_CARRIER] = state.was_carrying[b, target]
     out[WALL_HIT] = state.oob[b, v]
     out[NEARER] = 0.0
-    if not first:
+    if state.steps[b] > 1:
         goal_x, goal_y = home(us if carries else them, rules)
         out[NEARER] = apart(state.was_pos[b, v, 0], state.was_pos[b, v, 1], goal_x, goal_y)
         out[NEARER] -= apart(state.pos[b, v, 0], state.pos[b, v, 1], goal_x, goal_y)

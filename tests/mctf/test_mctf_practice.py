@@ -6,6 +6,7 @@ import pytest
 from mctf.kernel import BLUE_WON, RED_WON, RUNNING, finished, step
 from mctf.observe import observation_size, observe
 from mctf.practice import BY_THE_RULES, Starts, practise
+from mctf.rewards import TERMS, make_reward, rewards
 from mctf.rules import make_rules
 from mctf.scripted import NAMES, act
 from mctf.start import reset
@@ -131,3 +132,38 @@ def test_a_carrier_wins_by_driving_home(profile):
             assert state.events[b, v, EVENTS.index("captures")] == 1
         assert state.events[b, :, EVENTS.index("grabs")].sum() == 0
     assert won >= 10
+
+
+def first_paid(state, rules, term):
+    """Plays one step of every game in which nobody moves on purpose; returns (B, V) what ``term`` paid."""
+    reward = make_reward("outcome", {"won": 0.0, "lost": 0.0, term: 1.0})
+    out, seen = np.zeros(state.has_flag.shape), np.zeros((2, 4, observation_size(rules)))
+    for b in range(len(out)):
+        step(state, b, np.full(4, 16), rules)
+        rewards(reward, state, b, rules, *seen, np.zeros(len(TERMS)), out[b])
+    return out
+
+
+def test_who_grabs_the_flag_in_the_first_step_is_paid():
+    state, rules = started(Starts(near_flag=1.0, near_flag_m=30.0))
+    paid = first_paid(state, rules, "grabbed")
+    assert state.has_flag.any()
+    assert (paid == state.has_flag).all()
+
+
+def test_who_loses_it_in_the_first_step_pays():
+    state, rules = started(Starts(carrying=1.0))
+    carrying = state.has_flag.copy()
+    paid = first_paid(state, rules, "dropped")
+    lost = carrying & ~state.has_flag & ~state.capture.any(axis=1, keepdims=True)
+    assert lost.any()
+    assert (paid == lost).all()
+
+
+def test_who_brings_it_home_in_the_first_step_is_paid():
+    state, rules = started(Starts(carrying=1.0))
+    blue = state.has_flag[:, :2].copy()
+    state.pos[:, :2][blue] = HALF + 1.0, 50.0
+    paid = first_paid(state, rules, "team_captured")
+    assert blue.any()
+    assert (paid[:, :2] == blue.any(axis=1, keepdims=True)).all()  # both of the team

@@ -81,11 +81,12 @@ def test_wall(game):
     assert earned(game, SPARSE) == [-100.0, 0.0, 0.0, 0.0]
 
 
-def test_nothing_is_new_in_the_first_step(game):
+def test_nobody_comes_nearer_in_the_first_step(game):
+    game.put(0, 100.0, 50.0)
+    game.was_pos[0] = 105.0, 50.0
+    assert earned(game, CUSTOM_REW)[0] == pytest.approx(0.1)
     game.state.steps[0] = 1
-    put(game, has_flag=0, pickup=0, is_tagged=3, capture=1, oob=1).tagged_opponent[0] = 3
-    assert earned(game, CUSTOM_REW2) == [0.05, -1.0, 0.0, 0.0]
-    assert earned(game, SPARSE) == [100.0, -100.0, 0.0, -50.0]
+    assert earned(game, CUSTOM_REW)[0] == 0.0
 
 
 @pytest.mark.parametrize(
