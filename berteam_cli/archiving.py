@@ -42,10 +42,10 @@ def cell_rows(run: Run, parts: Parts) -> Iterator[Row]:
 
 
 def filled(run: Run, parts: Parts) -> Iterator[tuple[Any, Archive, Any]]:
-    """Returns each island with the archive and (C,) its fittest of each cell, counted within it."""
+    """Returns each island that is rated with the archive and (C,) its fittest of each cell, counted within it."""
     optimizer = parts.optimizer
     if isinstance(optimizer, MapElites) and optimizer.archive is not None:
-        for island in optimizer.islands:
+        for island in (x for x in optimizer.islands if not x.exploits):
             yield island, optimizer.archive, optimizer.cells(run.population, island, optimizer.archive)[1]
 
 

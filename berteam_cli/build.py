@@ -213,7 +213,7 @@ def field_of(config: TrainConfig, islands: tuple[Island, ...], game: Env) -> Fie
             valid = allowed(places, [island.name for island in islands], owners, config.team_size)
     except ValueError as error:
         raise InputError(str(error)) from error
-    valid = without_exploiters(valid, islands, owners, config.team_size)
+    valid = without_exploiters(valid, islands, config.team_size)
     return Field(owners, config.team_size, game.sides, valid, config.selector.exact_limit)
 
 

@@ -26,16 +26,22 @@ UNMOVED = {"learning_rate": 0.0, "entropy_coef": 0.0, "gamma": 1.0}
 def breeding(settings: dict[str, Any], islands: tuple[Island, ...], game: Env) -> Breeding:
     """Takes ``perturb``, ``mutation`` and ``crossover`` out of ``settings``; returns in what copies differ.
 
+    Exploiters, of whom there are no copies, need not be able to.
+
     Raises:
-        InputError: a learner or the game cannot do it.
+        InputError: a learner or the game cannot do it, or there are no copies.
     """
     factors = settings.pop("perturb")
+    bred = {name: settings.pop(name) for name in ("mutation", "crossover")}
+    asked = [f"perturb.{name}" for name in factors if factors[name] > 1] + [name for name in bred if bred[name] > 0]
+    if asked and settings["replacements"] == 0:
+        raise InputError(f"optimizer.{asked[0]} has no effect with optimizer.replacements=0, where nobody is copied.")
+    copied = tuple(island for island in islands if not island.exploits)
     for name in TRAITS:
         if factors[name] > 1:
-            check_trait(name, islands)
-    bred = {name: settings.pop(name) for name in ("mutation", "crossover")}
+            check_trait(name, copied)
     for name, value in bred.items():
-        for island in islands if value > 0 else ():
+        for island in copied if value > 0 else ():
             if not isinstance(island.learner, Breedable):
                 raise InputError(
                     f"optimizer.{name} must be 0 with the island {island.name}, as its learner "

@@ -23,6 +23,9 @@ from berteam_cli.learner.ppo import Ppo
 from berteam_cli.learner.stacked_dqn import StackedDqn
 from berteam_cli.learner.stacked_ppo import StackedPpo
 from berteam_cli.learner.zipped import Unfit
+from berteam_cli.optimizer.base import Optimizer
+from berteam_cli.optimizer.coevolution import Coevolution
+from berteam_cli.optimizer.perturbing import GAMMA
 from berteam_cli.population import Island
 
 MEMBERS = "members"  # the island of members from files
@@ -179,12 +182,12 @@ def check_settings(settings: dict[str, Any], key: str) -> None:
         raise InputError(f"{key}.gradient_steps must be >= 1, or -1 for as many as transitions, but is 0.")
 
 
-def discounts(islands: tuple[Island, ...], game: Env) -> list[str]:
-    """Returns a remark for each island whose learner discounts otherwise than the potential in the game's reward."""
+def discounts(optimizer: Optimizer, game: Env) -> list[str]:
+    """Returns a remark for each island whose members discount otherwise than the potential in the game's reward."""
     if not isinstance(game, Mctf) or game.reward.shaping.potential == 0:
         return []
     ours, remarks = game.reward.shaping.potential_discount, []
-    for island in islands:
+    for island in optimizer.islands:
         learner: Any = island.learner
         gamma = getattr(learner, "gamma", None)
         if gamma is None and hasattr(learner, "options"):
@@ -194,4 +197,9 @@ def discounts(islands: tuple[Island, ...], game: Env) -> list[str]:
                 f"The potential in the reward changes which policy is best on island {island.name}, as its learner "
                 f"discounts by gamma={gamma:g} and env.potential_discount is {ours:g}."
             )
+    if isinstance(optimizer, Coevolution) and GAMMA in optimizer.breeding.perturbation.moved:
+        remarks.append(
+            "The potential in the reward changes which policy is best for copies, as optimizer.perturb.gamma lets them "
+            f"discount otherwise than env.potential_discount={ours:g}."
+        )
     return remarks

@@ -15,8 +15,8 @@ from berteam_cli.opponents.league import League
 from berteam_cli.opponents.none import Nobody
 from berteam_cli.opponents.past import Past
 from berteam_cli.opponents.scripted import Scripted
-from berteam_cli.outcomes import Bools, Ints
-from berteam_cli.population import Island, learners
+from berteam_cli.outcomes import Bools
+from berteam_cli.population import Island, learners, rated
 
 SHARES = ("past_share", "scripted_share", "exploit_share")
 
@@ -148,7 +148,7 @@ def check_exploiters(told: LeagueConfig, islands: tuple[Island, ...]) -> None:
         raise InputError(f"opponents.exploit_share {asked}, but is {told.exploit_share:g}.")
 
 
-def without_exploiters(valid: Bools | None, islands: tuple[Island, ...], owners: Ints, team_size: int) -> Bools | None:
+def without_exploiters(valid: Bools | None, islands: tuple[Island, ...], team_size: int) -> Bools | None:
     """Returns (T, N) who may stand at each place: of those ``valid``, or of all, the ones who are no exploiters.
 
     Raises:
@@ -156,7 +156,7 @@ def without_exploiters(valid: Bools | None, islands: tuple[Island, ...], owners:
     """
     if not any(island.exploits for island in islands):
         return valid
-    free = ~np.array([island.exploits for island in islands])[owners]
+    free = rated(islands)
     rows = np.tile(free, (team_size, 1)) if valid is None else valid & free
     for place in np.flatnonzero(~rows.any(axis=1)):
         raise InputError(f"selector.valid_members[{place}] must name more than opponents.exploiters.")

@@ -136,6 +136,11 @@ def learners(islands: tuple[Island, ...]) -> list[int]:
     return [n for island in islands if island.learns and not island.exploits for n in island.numbers]
 
 
+def rated(islands: tuple[Island, ...]) -> Bools:
+    """Returns (N,) who is chosen for teams, and so rated: all but exploiters."""
+    return ~np.repeat([island.exploits for island in islands], [island.size for island in islands])
+
+
 def island_of(islands: tuple[Island, ...]) -> Ints:
     """Returns (N,) the island of each member."""
     return np.repeat(np.arange(len(islands)), [island.size for island in islands])

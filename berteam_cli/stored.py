@@ -24,6 +24,8 @@ from berteam_cli.trust import check_trusted
 
 MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation", "logger")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
+REFERENCE = "evaluation.reference_teams"
+"""The one key of those that may not: with ``evaluate_every`` it says who is met in looks that are done already."""
 LARGEST = 2**24  # bytes of a config; usual are three thousand
 PLACE = ("out", "on_exists")
 """Keys that say where a run goes, not what it does."""
@@ -141,7 +143,8 @@ def check_same(folder: Path, text: str) -> None:
     """
     old, new = flat(OmegaConf.to_container(plain_config(folder))), flat(OmegaConf.to_container(OmegaConf.create(text)))
     for key in sorted(old.keys() | new.keys()):
-        if key.split(".", maxsplit=1)[0] not in MAY_CHANGE + PLACE and old.get(key) != new.get(key):
+        free = key.split(".", maxsplit=1)[0] in MAY_CHANGE + PLACE and not (key == REFERENCE and old["evaluate_every"])
+        if not free and old.get(key) != new.get(key):
             raise InputError(
                 f"{key} is {new.get(key)!r}, but the run in {folder} was begun with {old.get(key)!r}; "
                 f"it can only go on with the same."

@@ -69,7 +69,7 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
     with logging_to(folder):
         state = sum(state_bytes(island) for island in parts.optimizer.islands)
         played = sum(column.nbytes for column in parts.room or ())
-        for remark in (*parts.selector.remarks(), *discounts(parts.optimizer.islands, parts.games.env)):
+        for remark in (*parts.selector.remarks(), *discounts(parts.optimizer, parts.games.env)):
             log.info("%s", remark)
         log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
         if against := parts.opponents.remarks():

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from berteam_cli.outcomes import Floats
-from berteam_cli.population import island_of, names
+import numpy as np
+
+from berteam_cli.outcomes import Floats, Ints
+from berteam_cli.population import island_of, names, rated
 from berteam_cli.selector.embeddings import cosines, groups, mean_cosine, nearest
 from berteam_cli.training import Parts, Run
 
@@ -16,6 +18,8 @@ NEIGHBOURS = 5
 def likeness(run: Run, parts: Parts, behaviour: Floats) -> dict[str, list[tuple[Any, ...]]]:
     """Returns the rows of embeddings.csv and neighbours.csv of a run whose selector has embeddings.
 
+    Exploiters are left out: the selector never sees them, so their vectors say nothing.
+
     Args:
         run: as it stands.
         parts: of it.
@@ -23,21 +27,23 @@ def likeness(run: Run, parts: Parts, behaviour: Floats) -> dict[str, list[tuple[
     """
     islands = parts.optimizer.islands
     selector: Any = parts.selector  # an Embedding
-    similarity = cosines(selector.embeddings(run.selection))
-    home = [islands[i] for i in island_of(islands)]
+    members = np.flatnonzero(rated(islands))
+    similarity = cosines(selector.embeddings(run.selection)[members])
+    home = [islands[i] for i in island_of(islands)[members]]
     labels = [x.name for x in home], [x.learner.algorithm for x in home]
-    found = groups(*labels, run.population.fitness, behaviour)
+    found = groups(*labels, run.population.fitness[members], behaviour[members])
     mean = mean_cosine(similarity, found["all"])
     rows = []
     for name, chosen in found.items():
         size, cosine = int(chosen.sum()), mean_cosine(similarity, chosen)
         rows.append((run.epoch, name, size, size * (size - 1) // 2, cosine, cosine - mean))
-    return {"embeddings": rows, "neighbours": list(neighbour_rows(run, parts, similarity))}
+    return {"embeddings": rows, "neighbours": list(neighbour_rows(run, parts, members, similarity))}
 
 
-def neighbour_rows(run: Run, parts: Parts, similarity: Floats) -> Iterator[tuple[Any, ...]]:
-    """Returns the rows of neighbours.csv."""
+def neighbour_rows(run: Run, parts: Parts, members: Ints, similarity: Floats) -> Iterator[tuple[Any, ...]]:
+    """Returns the rows of neighbours.csv, of ``members`` (K,) and (K, K) how alike they are."""
     called = names(parts.optimizer.islands, run.population)
-    for n, others in enumerate(nearest(similarity, NEIGHBOURS)):
+    for k, others in enumerate(nearest(similarity, NEIGHBOURS)):
         for rank, other in enumerate(others, start=1):
-            yield run.epoch, n, called[n], rank, other, called[other], similarity[n, other]
+            n, m = members[k], members[other]
+            yield run.epoch, n, called[n], rank, m, called[m], similarity[k, other]

@@ -10,7 +10,7 @@ from berteam_cli.learner.base import Learning
 from berteam_cli.optimizer.base import Probe, Replacement
 from berteam_cli.optimizer.fitness import FitnessRule
 from berteam_cli.outcomes import Experience, Outcomes
-from berteam_cli.population import Island, Population, counted
+from berteam_cli.population import Island, Population, counted, rated
 
 
 @dataclass(frozen=True)
@@ -48,4 +48,6 @@ class Fixed:
 
     def renew(self, population: Population, rng: Generator) -> tuple[Population, list[Replacement]]:
         """Returns the population one epoch older."""
-        return replace(population, age=population.age + 1, fitness=self.fitness.centred(population.fitness)), []
+        fitness, able = population.fitness.copy(), rated(self.islands)
+        fitness[able] = self.fitness.centred(fitness[able])
+        return replace(population, age=population.age + 1, fitness=fitness), []

@@ -107,6 +107,15 @@ WRONG = {
     (*SIX, "learner=sb3", "optimizer.crossover=0.1"): r"optimizer.crossover must be 0 .*\(A2C\)",
     (*RPS, "optimizer.perturb.reward=2"): "optimizer.perturb.reward must be 1 where the reward has no weights",
     (*SIX, "env.reward=custom_rew", "optimizer.perturb.reward=2"): "optimizer.perturb.reward must be 1",
+    (*SIX, "optimizer.replacements=0", "optimizer.mutation=0.1"): "optimizer.mutation has no effect with opt",
+    (*SIX, "optimizer.replacements=0", "optimizer.perturb.reward=2"): "optimizer.perturb.reward has no effect with opt",
+    (
+        "population=mixed4x3",
+        "opponents=league",
+        "opponents.exploiters=[ppo64]",
+        "opponents.exploit_share=0.2",
+        "optimizer.perturb.entropy_coef=2",
+    ): "optimizer.perturb.entropy_coef must be 1",
     (
         *RPS,
         "optimizer=mapelites",

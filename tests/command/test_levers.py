@@ -54,6 +54,9 @@ def test_a_run_that_sees_three_steps_goes_everywhere(run, berteam, tmp_path):
 
 
 def test_another_discount_is_told_of(berteam, tmp_path):
+    berteam("train", *GAME, "env.potential=1", "optimizer.perturb.gamma=2", "epochs=0", "out=moved")
+    told = " ".join((tmp_path / "moved" / "log.txt").read_text().split())
+    assert "as optimizer.perturb.gamma lets them discount otherwise than env.potential_discount=0.99." in told
     said = "The potential in the reward changes which policy is best on island main, as its learner discounts by "
     for words, gamma in (([], "0.98"), (["learner=sb3", "learner.algorithm=A2C"], "0.97")):
         told = ["learner.options.gamma=0.97"] if words else ["learner.gamma=0.98", *GAME[3:4], GAME[-2]]

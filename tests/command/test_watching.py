@@ -74,6 +74,8 @@ def test_a_resumed_run_sees_the_same(words, berteam, tmp_path):
     assert list(read(tmp_path / "parts").epoch.unique()) == [0, 2, 4, 6]
     assert tables(tmp_path / "parts") == tables(tmp_path / "whole")
     assert "evaluate_every cannot be changed" in berteam("resume", "parts", "evaluate_every=3", code=2).stderr
+    others = berteam("resume", "parts", "epochs=7", "evaluation.reference_teams=2", code=2).stderr
+    assert "evaluation.reference_teams is 2, but the run in parts was begun with 28" in others
 
 
 def test_an_interrupted_run_sees_the_same(berteam, tmp_path):

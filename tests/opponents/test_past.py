@@ -87,7 +87,7 @@ def test_each_kind_is_thinned_by_itself_by_hand():
         return [x.key for x in thinned(tuple(pool), most)]
 
     own = [snapshot(number) for number in (0, 10, 30)]
-    # Gaps of its own kind: 30 around (10, own), 20 around (20, exploiters); the neighbours of another kind do not count.
+    # Gaps among its kind: 30 around (10, own), 20 around (20, exploiters); neighbours of another kind do not count.
     mixed = [*own[:2], *(snapshot(number, island=1) for number in (10, 20, 30)), own[2]]
     assert left(mixed, 5) == [(0, -1), (10, -1), (10, 1), (30, 1), (30, -1)]
     assert left(mixed, 4) == [(0, -1), (10, 1), (30, 1), (30, -1)]
