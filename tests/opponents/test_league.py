@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from berteam_cli import build
+from berteam_cli.archiving import archive_rows
 from berteam_cli.config import checked
 from berteam_cli.errors import InputError
+from berteam_cli.evaluation.likeness import likeness
 from berteam_cli.opponents.base import EXPLOITER, PAST, SCRIPTED
 from berteam_cli.outcomes import NOBODY, Experience
 from berteam_cli.population import policies
@@ -81,6 +83,18 @@ def test_exploiters_are_never_chosen(selector):
     assert not OUTSIDERS & set(made.selector.sample(run.selection, 200, rng).ravel())
     assert made.selector.captains(run.selection)[list(OUTSIDERS)].sum() == 0
     assert {x.island for x in report.replaced} <= {0, 3}
+    if selector == "berteam":
+        alike = likeness(run, made, np.full(12, np.nan))
+        assert {row[1] for row in alike["neighbours"]} == set(range(12)) - OUTSIDERS
+        assert {row[4] for row in alike["neighbours"]} == set(range(12)) - OUTSIDERS
+        assert [row[2] for row in alike["embeddings"] if row[1] == "all"] == [6]
+
+
+def test_exploiters_have_no_cells():
+    made = parts(*EXPLOITERS, "optimizer=mapelites", "optimizer.opponents=[]", "optimizer.archive=cvt", population=FOUR)
+    run, _ = epoch(begin(made), made)
+    islands = [island.name for island in made.optimizer.islands]
+    assert [row[1] for row in archive_rows(run, made)] == [islands[0], islands[3]]
 
 
 def test_exploiters_learn_and_are_neither_rated_nor_replaced():
