@@ -206,10 +206,11 @@ def side_rows(epoch: int, outcomes: Outcomes) -> Iterator[Row]:
 def opponent_rows(run: Run, met: Met, opponents: Opponents) -> Iterator[Row]:
     """Returns one row for each opponent that the selector's teams met, with what they scored; as it stands after."""
     scores: dict[Guest, list[float]] = {}
+    standings = opponents.standings(run.league)
     for met_there, beaten in zip(met.teams, met.beaten, strict=True):
         scores.setdefault(met_there._replace(side=NOBODY), []).append(float(beaten))
     for guest, games in scores.items():
         wins, losses = games.count(1.0), games.count(0.0)
         taken = "" if guest.epoch == NOBODY else guest.epoch
         counts = (len(games), wins, len(games) - wins - losses, losses)
-        yield (run.epoch, guest.kind, guest.name, taken, *counts, *opponents.standing(run.league, guest))
+        yield (run.epoch, guest.kind, guest.name, taken, *counts, *standings.get(guest.whose, (math.nan, math.nan)))

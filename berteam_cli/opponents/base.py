@@ -19,6 +19,10 @@ Choose = Callable[[int, Generator], Lineups]
 """Returns the line-ups of so many games as the selector makes them."""
 
 
+Whose = tuple[str, int, int]
+"""Kind, epoch and island of a guest: what it shares with all who are rated together with it."""
+
+
 class Guest(NamedTuple):
     """The team of one game that the selector did not choose.
 
@@ -35,6 +39,11 @@ class Guest(NamedTuple):
     side: int
     epoch: int = NOBODY
     island: int = NOBODY
+
+    @property
+    def whose(self) -> Whose:
+        """With whom it is rated."""
+        return self.kind, self.epoch, self.island
 
 
 @dataclass(frozen=True)
@@ -94,8 +103,8 @@ class Opponents(Protocol):
         Members may be frozen, and those who exploit the others may begin anew.
         """
 
-    def standing(self, state: Any, guest: Guest) -> tuple[float, float]:
-        """Returns how likely such a guest would be drawn now, and the estimated chance to beat it; NaN if unknown."""
+    def standings(self, state: Any) -> dict[Whose, tuple[float, float]]:
+        """Returns how likely guests would be drawn now, NaN if by no chances, and the estimated chance to beat them."""
 
     def remarks(self) -> list[str]:
         """Returns what a reader of the run should know of whom it was trained against, a sentence each."""

@@ -12,12 +12,12 @@ import torch
 from numpy.random import Generator
 
 from berteam_cli.acting import Policies, fixed_policies, joined
-from berteam_cli.opponents.base import EXPLOITER, PAST, PAST_EXPLOITER, Choose, Guest, Guests, Met, hosted
+from berteam_cli.opponents.base import Choose, Guest, Guests, Met, Whose, hosted
 from berteam_cli.opponents.exploiters import Attempt, Exploiters, anew
 from berteam_cli.opponents.past import Past, Snapshot, taken, thinned
 from berteam_cli.opponents.record import Record
 from berteam_cli.opponents.scripted import Scripted
-from berteam_cli.outcomes import NOBODY, Ints
+from berteam_cli.outcomes import Ints
 from berteam_cli.population import Island, Population
 
 log = logging.getLogger("berteam")
@@ -112,32 +112,30 @@ class League:
 
     def counted(self, state: LeagueState, met: Met) -> LeagueState:
         """Returns the state with the games of an epoch in the records."""
-        beaten: dict[tuple[str, int, int], list[float]] = {}
+        beaten: dict[Whose, list[float]] = {}
         for guest, score in zip(met.teams, met.beaten, strict=True):
-            beaten.setdefault((guest.kind, guest.epoch, guest.island), []).append(float(score))
+            beaten.setdefault(guest.whose, []).append(float(score))
 
-        def after(record: Record, half_life: float, *key: Any) -> Record:
-            scores = beaten.get(key, [])
-            return record.after(sum(scores), len(scores), half_life)
+        def after(known: Snapshot | Attempt, half_life: float) -> Record:
+            scores = beaten.get(known.whose, [])
+            return known.record.after(sum(scores), len(scores), half_life)
 
         pool, attempts = state.pool, state.attempts
         if self.past:
-            pool = tuple(replace(x, record=after(x.record, self.past.half_life, x.kind, *x.key)) for x in pool)
+            pool = tuple(replace(x, record=after(x, self.past.half_life)) for x in pool)
         if self.exploiters:
-            life = self.exploiters.half_life
-            attempts = tuple(replace(x, record=after(x.record, life, EXPLOITER, NOBODY, x.island)) for x in attempts)
+            attempts = tuple(replace(x, record=after(x, self.exploiters.half_life)) for x in attempts)
         return LeagueState(pool, attempts)
 
-    def standing(self, state: LeagueState, guest: Guest) -> tuple[float, float]:
-        """Returns how likely such a guest would be drawn now, and the estimated chance to beat it; NaN if unknown."""
-        if guest.kind in {PAST, PAST_EXPLOITER} and self.past:
-            chances = self.past.chances(state.pool)
-            for snapshot, chance in zip(state.pool, chances, strict=True):
-                if snapshot.key == (guest.epoch, guest.island):
-                    return float(chance), self.past.estimate(snapshot)
-        if guest.kind == EXPLOITER and self.exploiters:
-            return math.nan, next(self.exploiters.beaten(x) for x in state.attempts if x.island == guest.island)
-        return math.nan, math.nan
+    def standings(self, state: LeagueState) -> dict[Whose, tuple[float, float]]:
+        """Returns how likely guests would be drawn now, and the estimated chance to beat them; see Opponents."""
+        known: dict[Whose, tuple[float, float]] = {}
+        if self.past:
+            chances = self.past.chances(state.pool).tolist()
+            known |= {x.whose: (p, self.past.estimate(x)) for x, p in zip(state.pool, chances, strict=True)}
+        if self.exploiters:
+            known |= {x.whose: (math.nan, self.exploiters.beaten(x)) for x in state.attempts}
+        return known
 
     def remarks(self) -> list[str]:
         """Returns whom the run is trained against, beside itself."""

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 from numpy.random import Generator
 
-from berteam_cli.opponents.base import Choose, Guest, Guests, Met, nobody
+from berteam_cli.opponents.base import Choose, Guests, Met, Whose, nobody
 from berteam_cli.population import Population
 
 
@@ -39,9 +38,9 @@ class Nobody:
         """Returns the population as it is."""
         return population, None
 
-    def standing(self, state: None, guest: Guest) -> tuple[float, float]:
-        """Returns nothing known."""
-        return math.nan, math.nan
+    def standings(self, state: None) -> dict[Whose, tuple[float, float]]:
+        """Returns nobody."""
+        return {}
 
     def remarks(self) -> list[str]:
         """Returns nothing to remark."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from berteam_cli.acting import Policies
-from berteam_cli.opponents.base import PAST, PAST_EXPLOITER, Guest
+from berteam_cli.opponents.base import PAST, PAST_EXPLOITER, Guest, Whose
 from berteam_cli.opponents.record import Record
 from berteam_cli.optimizer.fitness import proportional
 from berteam_cli.outcomes import NOBODY, Floats, Ints
@@ -50,6 +50,11 @@ class Snapshot:
     def kind(self) -> str:
         """What a team of it is as an opponent."""
         return PAST if self.island == NOBODY else PAST_EXPLOITER
+
+    @property
+    def whose(self) -> Whose:
+        """What its teams are as guests."""
+        return self.kind, self.epoch, self.island
 
 
 @dataclass(frozen=True)

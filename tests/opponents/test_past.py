@@ -142,4 +142,4 @@ def test_what_was_played_is_in_the_records():
         run, report = epoch(run, made)
         beaten += report.met.beaten.sum()
         assert run.league.pool[0].record == (beaten, 3 * number)
-    assert made.opponents.standing(run.league, report.met.teams[0]) == (1.0, (2 + beaten) / (4 + 9))
+    assert made.opponents.standings(run.league) == {report.met.teams[0].whose: (1.0, (2 + beaten) / (4 + 9))}
