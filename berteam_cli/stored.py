@@ -142,8 +142,9 @@ def check_same(folder: Path, text: str) -> None:
         InputError: a key that may not change has another value.
     """
     old, new = flat(OmegaConf.to_container(plain_config(folder))), flat(OmegaConf.to_container(OmegaConf.create(text)))
+    fixed = REFERENCE if old.get("evaluate_every") else None
     for key in sorted(old.keys() | new.keys()):
-        free = key.split(".", maxsplit=1)[0] in MAY_CHANGE + PLACE and not (key == REFERENCE and old["evaluate_every"])
+        free = key.split(".", maxsplit=1)[0] in MAY_CHANGE + PLACE and key != fixed
         if not free and old.get(key) != new.get(key):
             raise InputError(
                 f"{key} is {new.get(key)!r}, but the run in {folder} was begun with {old.get(key)!r}; "
