@@ -25,7 +25,7 @@ from berteam_cli.trust import check_trusted
 MAY_CHANGE = ("epochs", "workers", "checkpoint_every", "evaluation", "logger")
 """Keys whose values may differ from those a run began with: they change nothing that is done already."""
 REFERENCE = "evaluation.reference_teams"
-"""The one key of those that may not: with ``evaluate_every`` it says who is met in looks that are done already."""
+"""Below ``evaluation``, but fixed where there is ``evaluate_every``: it says who was met in looks that are done."""
 LARGEST = 2**24  # bytes of a config; usual are three thousand
 PLACE = ("out", "on_exists")
 """Keys that say where a run goes, not what it does."""
