@@ -10,12 +10,11 @@ help: ## what can be made
 
 setup: $(READY) ## a virtual environment with the package and its tests' needs, and the kernels compiled
 
-# Not compiled: of the packages' files one in seven is ever imported, and compiled then.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; assert (3, 11) <= sys.version_info < (3, 14), "Python 3.11 to 3.13 is needed; name one: make PYTHON=python3.12 ..."'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --no-compile --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	$(BIN)/berteam train experiment=quickstart epochs=2 evaluation.games=0 out=build/first on_exists=overwrite > build.log
 	rm -r build/first build.log
 	touch $(READY)
