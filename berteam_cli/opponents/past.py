@@ -54,7 +54,7 @@ class Snapshot:
     @property
     def whose(self) -> Whose:
         """What its teams are as guests."""
-        return self.kind, self.epoch, self.island
+        return self.kind, *self.key
 
 
 @dataclass(frozen=True)

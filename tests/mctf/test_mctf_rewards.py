@@ -81,6 +81,14 @@ def test_wall(game):
     assert earned(game, SPARSE) == [-100.0, 0.0, 0.0, 0.0]
 
 
+def test_what_is_new_in_the_first_step_is_paid_as_in_any_other(game):
+    put(game, has_flag=0, pickup=0, is_tagged=3, capture=1, oob=1).tagged_opponent[0] = 3
+    for steps in (1, 2):
+        game.state.steps[0] = steps
+        assert earned(game, CUSTOM_REW2) == [0.05, -2.0, 0.0, -0.05]
+        assert earned(game, SPARSE) == [50.0, -150.0, 50.0, 0.0]
+
+
 def test_nobody_comes_nearer_in_the_first_step(game):
     game.put(0, 100.0, 50.0)
     game.was_pos[0] = 105.0, 50.0
