@@ -34,6 +34,7 @@ TASKS_A_PROCESSOR = 4  # at least, where there are so many games: enough that pr
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",  # nothing is sent anywhere
     "RAY_NUM_REDIS_GET_RETRIES": "1",  # of 40 s each, to find a cluster; Ray takes 20
+    "RAY_IGNORE_UNHANDLED_ERRORS": "1",  # of the other tasks, when one has failed; that one is told
 }
 LIVES = 20  # deaths of workers and machines that a task outlives
 PATIENCE_S = 60.0  # without a result, before that is told

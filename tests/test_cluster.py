@@ -1,5 +1,7 @@
 """Games on a Ray cluster: two machines, in Ray's eyes, that are started here."""
 
+import gc
+import logging
 import os
 import pickle
 import secrets
@@ -184,6 +186,19 @@ def test_a_machine_with_other_versions_is_refused():
     call = Call("", b"", *[None] * 4, versions={**cluster.versions(), "numba": "0.1"})
     with pytest.raises(RunError, match=r"A machine of the Ray cluster has numba .*, this one 0\.1\."):
         play_slice(pickle.dumps(call), 0, 1)
+
+
+def test_when_all_tasks_fail_one_is_told(machines, monkeypatch, caplog):
+    """Ray would tell of the others too, whenever Python collects what nobody asks for."""
+    monkeypatch.setattr(cluster, "versions", lambda: {"numba": "0.1"})
+    games, lineups = mctf(), pairings(*np.zeros((2, 8, 2), dtype=np.int64))
+    elsewhere = Games(games.env, games.workers, Cluster())
+    for _ in range(3):
+        with pytest.raises(RunError, match=r"A machine of the Ray cluster has numba"):
+            elsewhere.play(fixed_policies([0]), lineups, 5)
+        time.sleep(1)  # in which the others fail
+        gc.collect()
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
 
 
 @pytest.mark.parametrize(("games", "processors", "size"), [(1, 2, 1), (25, 2, 3), (2000, 2, 64), (2000, 64, 7)])
