@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from berteam_cli import build, checkpoint
-from berteam_cli.acting import Policies, fixed_policies
+from berteam_cli.acting import Policies, fixed_policies, joined
 from berteam_cli.command.inspect import read_table
 from berteam_cli.config import checked
 from berteam_cli.config_commands import ReplayConfig
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
-from berteam_cli.errors import InputError, RunError
+from berteam_cli.errors import InputError, RunError, did_you_mean
 from berteam_cli.folder import new_folder, read_manifest, write_whole
 from berteam_cli.games import Games, pairings
 from berteam_cli.outcomes import Experience, Ints, Outcomes
@@ -44,6 +44,8 @@ class Match:
         env: the game.
         policies: how the players act.
         names: of the players.
+        called: how each player is named on the command line: members of a run and fixed policies alone by index,
+            fixed policies beside members by name.
         blue, red: players of each team, place by place.
         title: what is played.
     """
@@ -51,6 +53,7 @@ class Match:
     env: Mctf
     policies: Policies
     names: list[str]
+    called: list[str]
     blue: Team
     red: Team
     title: str
@@ -72,7 +75,7 @@ def replay(config: ReplayConfig, text: str, out: Path | None) -> float:
     files = places(config, match, out)
     outcomes, experience = played(match, config.seed)
     film = checked_film(match.env, outcomes, experience)
-    steering = [f"{member} {match.names[member]}" for member in match.blue + match.red]
+    steering = [label(match, member) for member in match.blue + match.red]
     for kind, path in files.items():
         if kind == "html":
             write_whole(path, lambda part: write_page(film, part, steering, match.title))
@@ -112,23 +115,24 @@ def of_fixed_policies(config: ReplayConfig) -> Match:
         InputError: a team is not named, or is none.
     """
     game = filmable(build.env(config.env, config.team_size))
-    called = list(game.fixed_policies)
+    named = list(game.fixed_policies)
     for key, given in (("blue", config.blue), ("red", config.red)):
         if given is None:
             raise InputError(
                 f"{key} must name a team when no run is given, "
-                f"such as {key}={example(sizes(game)[0])}, which is {called[0]} first."
+                f"such as {key}={example(sizes(game)[0])}, which is {named[0]} first."
             )
     blue, red = (
-        team(key, str(given), size, len(called), called)
+        team(key, str(given), size, len(named), {name: k for k, name in enumerate(named)})
         for key, given, size in zip(("blue", "red"), (config.blue, config.red), sizes(game), strict=True)
     )
-    title = f"Fixed policies: {versus(blue, red, called)}, seed {config.seed}"
-    return Match(game, fixed_policies(range(len(called))), called, blue, red, title)
+    called = [str(k) for k in range(len(named))]
+    title = f"Fixed policies: {versus(blue, red, named, called)}, seed {config.seed}"
+    return Match(game, fixed_policies(range(len(named))), named, called, blue, red, title)
 
 
 def of_run(config: ReplayConfig, folder: Path) -> Match:
-    """Returns two teams of a trained run, acting as they are evaluated; by default the strongest ones.
+    """Returns two teams of members or fixed policies, acting as in evaluations; by default the strongest of the run.
 
     Raises:
         InputError: there is no such run, or no such team in it.
@@ -140,13 +144,16 @@ def of_run(config: ReplayConfig, folder: Path) -> Match:
     run = checkpoint.load(folder, parts).run
     population, islands = run.population, parts.optimizer.islands
     given = strongest(folder, config.blue, config.red)
+    fixed = list(game.fixed_policies)
     blue, red = (
-        team(key, text, size, population.size)
+        team(key, text, size, population.size, {name: population.size + k for k, name in enumerate(fixed)})
         for key, text, size in zip(("blue", "red"), given, sizes(game), strict=True)
     )
-    called = names(islands, population)
-    title = f"{folder} after epoch {run.epoch}: {versus(blue, red, called)}, seed {config.seed}"
-    return Match(game, policies(islands, population, explore=False), called, blue, red, title)
+    named = names(islands, population) + fixed
+    called = [*map(str, range(population.size)), *fixed]
+    acting = joined([policies(islands, population, explore=False), fixed_policies(range(len(fixed)))])
+    title = f"{folder} after epoch {run.epoch}: {versus(blue, red, named, called)}, seed {config.seed}"
+    return Match(game, acting, named, called, blue, red, title)
 
 
 def filmable(game: Env) -> Mctf:
@@ -189,15 +196,15 @@ def strongest(folder: Path, blue: str | None, red: str | None) -> tuple[str, str
     return blue, best_but(blue, "red") if red is None else red
 
 
-def team(key: str, given: str, size: int, members: int, called: Collection[str] = ()) -> Team:
-    """Returns the members that ``given`` names, place by place.
+def team(key: str, given: str, size: int, members: int, fixed: Mapping[str, int]) -> Team:
+    """Returns the players that ``given`` names, place by place.
 
     Args:
         key: of the config, for the message.
-        given: indices or names, joined by hyphens.
+        given: indices or names of fixed policies, joined by hyphens.
         size: how many they must be.
-        members: how many there are.
-        called: their names, if they may be named.
+        members: how many have an index.
+        fixed: the players that have a name.
 
     Raises:
         InputError: they are not as many, or one does not exist.
@@ -209,14 +216,15 @@ def team(key: str, given: str, size: int, members: int, called: Collection[str] 
         )
     found = []
     for word in words:
-        if word in called:
-            found.append(list(called).index(word))
+        if word in fixed:
+            found.append(fixed[word])
         elif word.isdecimal() and int(word) < members:
             found.append(int(word))
-        elif called and not word.isdecimal():
-            raise InputError.choice(f"A member of {key}", word, called)
         else:
-            raise InputError(f"A member of {key} must be one of 0 to {members - 1}, but is {word!r}.")
+            raise InputError(
+                f"A member of {key} must be one of 0 to {members - 1}, or {', '.join(sorted(fixed))}, "
+                f"but is {word!r}.{did_you_mean(word, fixed)}"
+            )
     return found
 
 
@@ -225,15 +233,21 @@ def example(size: int) -> str:
     return "-".join(str(member % 7) for member in range(size))
 
 
-def hyphenated(members: Team) -> str:
+def hyphenated(members: Team, called: list[str]) -> str:
     """Returns a team with its members in their places."""
-    return "-".join(map(str, members))
+    return "-".join(called[member] for member in members)
 
 
-def versus(blue: Team, red: Team, called: list[str]) -> str:
-    """Returns who plays whom, by index and by name."""
-    sides = (f"{hyphenated(side)} ({' + '.join(called[member] for member in side)})" for side in (blue, red))
+def versus(blue: Team, red: Team, named: list[str], called: list[str]) -> str:
+    """Returns who plays whom, as they are called and by name."""
+    sides = (f"{hyphenated(side, called)} ({' + '.join(named[member] for member in side)})" for side in (blue, red))
     return "blue {} against red {}".format(*sides)
+
+
+def label(match: Match, player: int) -> str:
+    """Returns what stands beside a vehicle's name in a film."""
+    called, name = match.called[player], match.names[player]
+    return name if called == name else f"{called} {name}"
 
 
 def places(config: ReplayConfig, match: Match, out: Path | None) -> dict[str, Path]:
@@ -245,7 +259,7 @@ def places(config: ReplayConfig, match: Match, out: Path | None) -> dict[str, Pa
     kinds = ("html", "gif") if config.format == "both" else (config.format,)
     if out is None:
         folder = new_folder("replay") if config.run is None else Path(config.run) / "replay"
-        out = folder / f"{hyphenated(match.blue)}_{hyphenated(match.red)}"
+        out = folder / f"{hyphenated(match.blue, match.called)}_{hyphenated(match.red, match.called)}"
     elif out.suffix in {".html", ".gif"}:
         if kinds != (out.suffix[1:],):
             raise InputError(

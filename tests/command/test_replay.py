@@ -97,6 +97,22 @@ def test_a_run(berteam, run, tmp_path):
     assert (odd / "replay" / "0-0_1-1.html").exists()
 
 
+def test_a_team_of_a_run_against_fixed_policies(berteam, run, tmp_path):
+    best = (run / "elo.csv").read_text().splitlines()[1].split(",")[0]
+    said = berteam("replay", "run", "red=attack_hard-defend_hard").stdout.splitlines()
+    assert "against red attack_hard-defend_hard (attack_hard + defend_hard), seed 0." in said[0]
+    assert said[2] == f"Files in run/replay: {best}_attack_hard-defend_hard.html"
+    film = film_in(run / "replay" / f"{best}_attack_hard-defend_hard.html")
+    assert film["names"][2:] == ["attack_hard", "defend_hard"]
+
+    # Both are who they are called: fixed policies play as without the run, members as in it
+    berteam("replay", "blue=attack_hard-5", "red=4-0", SHORT, "out=fixed.html")
+    berteam("replay", "run", "blue=attack_hard-defend_hard", "red=defend_medium-attack_easy", "out=same.html")
+    assert film_in(tmp_path / "same.html")["pos"] == film_in(tmp_path / "fixed.html")["pos"]
+    berteam("replay", "run", "blue=4-random", "red=2-2", "out=mixed.html")
+    assert film_in(tmp_path / "mixed.html")["names"] == ["4 main.4", "random", "2 main.2", "2 main.2"]
+
+
 def test_a_run_that_rated_nothing(berteam, run):
     (run / "elo.csv").unlink()
     assert "rated too few teams to choose one" in berteam("replay", "run", code=2).stderr
@@ -112,8 +128,11 @@ def test_a_run_that_rated_nothing(berteam, run):
         (["blue=2-5"], "red must name a team when no run is given, such as red=0-1"),
         ([], "blue must name a team when no run is given"),
         (["blue=2-5-1", "red=0-1"], "blue must be 2 members joined by hyphens, such as 0-1, but '2-5-1' is 3"),
-        (["blue=2-5", "red=0-16"], "A member of red must be one of 0 to 15, but is '16'"),
-        (["blue=2-5", "red=0-"], "A member of red must be one of attack_competition_easy.*but is ''"),
+        (
+            ["blue=2-5", "red=0-16"],
+            "A member of red must be one of 0 to 15, or attack_competition_easy, .*, but is '16'",
+        ),
+        (["blue=2-5", "red=0-"], "A member of red must be one of 0 to 15, or attack_competition_easy, .*, but is ''"),
         (["blue=2-atack_hard", "red=0-1"], "A member of blue must be one of .*Did you mean attack_hard"),
         (["blue=0-1", "red=0-1", "format=mp4"], "format must be one of both, gif, html, but is 'mp4'"),
         (["blue=0-1", "red=0-1", "out=x.gif"], "out=x.gif does not go with format=html"),
@@ -141,8 +160,12 @@ def test_wrong_input(words, said, berteam, tmp_path):
 
 
 def test_wrong_members_of_a_run(berteam, run):
-    assert "must be one of 0 to 5, but is '6'" in berteam("replay", "run", "blue=0-6", "red=0-1", code=2).stderr
-    assert "must be one of 0 to 5, but is 'main.0'" in berteam("replay", "run", "blue=main.0-1", code=2).stderr
+    for given in ("6", "main.0"):
+        said = berteam("replay", "run", f"blue=0-{given}", "red=0-1", code=2).stderr
+        assert "A member of blue must be one of 0 to 5, or attack_competition_easy, " in said
+        assert said.endswith(f", waypoint, but is {given!r}.\n")
+    said = berteam("replay", "run", "red=defend-0", code=2).stderr
+    assert said.endswith(", but is 'defend'. Did you mean defend_hard?\n")
     assert "must be 2 members" in berteam("replay", "run", "red=1", code=2).stderr
     assert not (run / "replay").exists()
 
