@@ -8,12 +8,17 @@ import pandas as pd
 import pytest
 import yaml
 
+from berteam_cli.command.replay import players
 from berteam_cli.compose import check, prepare
+from berteam_cli.config import checked
 from berteam_cli.sweep.folder import Sweep
+from mctf.rules import BLUE
+from mctf.state import CAPTURES, GRABS
 from tests.docs.pages import ROOT
+from tests.test_config import composed
 
 RESULTS = ROOT / "docs" / "results"
-SCRIPTS = ("tables", "selection", "roles", "levers", "curves")
+SCRIPTS = ("tables", "selection", "roles", "levers", "curves", "grabs")
 
 
 @pytest.fixture
@@ -42,6 +47,41 @@ def test_selectors_are_compared_population_by_population(scripts):
     elos = pd.DataFrame({"berteam": [1010.0, 1110.0], "uniform": [1000.0, 1100.0]}, index=["a", "b"])
     elos.index.name = "population"
     assert "| berteam - uniform | 2 | 10 ± 0 |" in scripts.selection.compared(elos)
+
+
+def test_grabs_end_at_home_at_a_tag_or_with_the_time(scripts):
+    rules = SimpleNamespace(blue_size=2, tagging_cooldown_s=30.0)
+    pos = np.zeros((9, 4, 2))
+    pos[:, 2], pos[:, 3] = (12.0, 0.0), (0.0, 40.0)  # apart from blue, which stays at the origin
+    cooldown = np.full((9, 4), 30.0)
+    cooldown[5:, 2] = np.arange(4.0)  # it tags in frame 5
+    pos[7:, 2] = (3.0, 4.0)
+    happened = [
+        (1, "grab", 0),
+        (1, "grab", 2),
+        (5, "lost_by_tag", 0),
+        (5, "grab", 1),
+        (6, "capture", 1),
+        (7, "grab", 0),
+    ]
+    events = [SimpleNamespace(frame=frame, kind=kind, vehicle=v) for frame, kind, v in happened]
+    film = SimpleNamespace(rules=rules, pos=pos, cooldown=cooldown, events=events, time=2.0 * np.arange(9))
+    lost, home, kept = scripts.grabs.grabs(film)
+    assert lost == (12.0, False, False, 8.0)
+    assert home[:3] == (12.0, False, True)  # it could have tagged this one in the step in which it tagged the other
+    assert kept[:3] == (5.0, True, False)
+    assert np.isnan([home.lost_s, kept.lost_s]).all()
+    row = scripts.grabs.table([lost, home, kept]).loc[12.0]
+    assert row.iloc[:3].to_list() == [2, 1, 8.0]
+    assert row.iloc[3] == 0
+
+
+def test_grabs_are_those_of_the_game(scripts):
+    match = players(checked(composed("blue=2-2", "red=3-5", command="replay")))
+    for film in scripts.grabs.films(match, 3):
+        found = scripts.grabs.grabs(film)
+        assert len(found) == film.score[-1, BLUE, GRABS] > 0
+        assert sum(grab.home for grab in found) == film.score[-1, BLUE, CAPTURES]
 
 
 def test_roles_are_what_members_add_to_their_teams(scripts):
