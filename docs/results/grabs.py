@@ -21,7 +21,7 @@ from berteam_cli.workers import Workers
 from mctf.film import Film, filmed
 
 LOST = ("lost_by_tag", "lost_by_wall")
-FAR_M = [0, 10, 11, 12, 13, 14, 15, np.inf]
+FAR_M = [0.0, 10.0, 12.0, 13.0, 14.0, np.inf]
 
 
 class Grab(NamedTuple):
@@ -76,10 +76,10 @@ def table(found: list[Grab]) -> pd.DataFrame:
     given = pd.DataFrame(found, columns=Grab._fields)
     given["far"] = pd.cut(given.far_m, FAR_M, right=False)
     said = {}
-    for waits, whose in ((False, "may tag"), (True, "waits")):
+    for waits, when in ((False, "it may tag"), (True, "it waits")):
         rows = given[given.waits == waits].groupby("far", observed=False)
-        said |= {f"it {whose}: grabs": rows.size(), "home" + " " * waits: rows.home.sum()}
-        said["lost after s (median)" + " " * waits] = rows.lost_s.median()
+        said |= {f"{when}: grabs": rows.size(), f"{when}: brought home": rows.home.sum()}
+        said[f"{when}: else lost after, s (median)"] = rows.lost_s.median()
     return pd.DataFrame(said).rename_axis("nearest opponent, m")
 
 
