@@ -83,9 +83,12 @@ def table(found: list[Grab]) -> pd.DataFrame:
     return pd.DataFrame(said).rename_axis("nearest opponent, m")
 
 
+def shown(found: pd.DataFrame) -> str:
+    """Returns the table as Markdown, with nothing where there is no median."""
+    return markdown(found.reset_index().map(lambda cell: "" if pd.isna(cell) else str(cell)))
+
+
 if __name__ == "__main__":
     run, blue, red, games = sys.argv[1:]
     match = of_run(ReplayConfig(run=run, trust=None, blue=blue, red=red, seed=0), Path(run))
-    print(
-        markdown(table([grab for film in films(match, int(games)) for grab in grabs(film)]).reset_index().astype(str))
-    )
+    print(shown(table([grab for film in films(match, int(games)) for grab in grabs(film)])))

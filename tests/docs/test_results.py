@@ -74,6 +74,7 @@ def test_grabs_end_at_home_at_a_tag_or_with_the_time(scripts):
     row = scripts.grabs.table([lost, home, kept]).loc[12.0]
     assert row.iloc[:3].to_list() == [2, 1, 8.0]
     assert row.iloc[3] == 0
+    assert "| [12.0, 13.0) | 2 | 1 | 8.0 | 0 | 0 |  |" in scripts.grabs.shown(scripts.grabs.table([lost, home, kept]))
 
 
 def test_grabs_are_those_of_the_game(scripts):
