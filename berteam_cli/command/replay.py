@@ -273,25 +273,25 @@ def places(config: ReplayConfig, match: Match, out: Path | None) -> dict[str, Pa
     return files
 
 
-def played(match: Match, seed: int) -> tuple[Outcomes, Experience]:
-    """Returns the game, with what everybody did in it; ``seed`` is of the players' chance."""
+def played(match: Match, seed: int, count: int = 1) -> tuple[Outcomes, Experience]:
+    """Returns ``count`` games, with what everybody did in them; ``seed`` is of the players' chance."""
     games = Games(match.env, Workers(1))
-    lineups = pairings(np.array([match.blue]), np.array([match.red]))
+    lineups = pairings(np.array([match.blue] * count), np.array([match.red] * count))
     return games.play(match.policies, lineups, seed, record=True)
 
 
-def checked_film(game: Mctf, outcomes: Outcomes, experience: Experience) -> Film:
-    """Returns the game of ``outcomes``, played again from its actions.
+def checked_film(game: Mctf, outcomes: Outcomes, experience: Experience, i: int = 0) -> Film:
+    """Returns game ``i`` of ``outcomes``, played again from its actions.
 
     Raises:
         RunError: it did not come out the same.
     """
-    actions = experience.actions[0, :, : outcomes.steps[0]].T
+    actions = experience.actions[i, :, : outcomes.steps[i]].T
     try:
-        film = filmed(actions, game.rules, int(outcomes.seeds[0]))
+        film = filmed(actions, game.rules, int(outcomes.seeds[i]))
     except ValueError as error:
         raise RunError(f"The game did not come out the same when it was played again: {error}") from error
-    counted: Ints = np.stack([outcomes.event("captures")[0], outcomes.event("grabs")[0]])
+    counted: Ints = np.stack([outcomes.event("captures")[i], outcomes.event("grabs")[i]])
     again = film.score[-1][:, [CAPTURES, GRABS]].T
     if film.end == RUNNING or not np.array_equal(again, counted):
         raise RunError(

@@ -7,18 +7,15 @@ tell those when that opponent could tag from those when it had tagged somebody a
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from tables import markdown
 
-from berteam_cli.command.replay import Match, of_run
+from berteam_cli.command.replay import Match, checked_film, played, players
 from berteam_cli.config_commands import ReplayConfig
-from berteam_cli.games import Games, pairings
-from berteam_cli.workers import Workers
-from mctf.film import Film, filmed
+from mctf.film import Film
 
 LOST = ("lost_by_tag", "lost_by_wall")
 FAR_M = [0.0, 10.0, 12.0, 13.0, 14.0, np.inf]
@@ -63,12 +60,8 @@ def grabs(film: Film) -> list[Grab]:
 
 def films(match: Match, games: int) -> list[Film]:
     """Returns ``games`` games of the two teams; 7 seeds their chance."""
-    lineups = pairings(np.array([match.blue] * games), np.array([match.red] * games))
-    outcomes, experience = Games(match.env, Workers(1)).play(match.policies, lineups, 7, record=True)
-    return [
-        filmed(experience.actions[i, :, : outcomes.steps[i]].T, match.env.rules, int(outcomes.seeds[i]))
-        for i in range(games)
-    ]
+    outcomes, experience = played(match, 7, games)
+    return [checked_film(match.env, outcomes, experience, i) for i in range(games)]
 
 
 def table(found: list[Grab]) -> pd.DataFrame:
@@ -90,5 +83,5 @@ def shown(found: pd.DataFrame) -> str:
 
 if __name__ == "__main__":
     run, blue, red, games = sys.argv[1:]
-    match = of_run(ReplayConfig(run=run, trust=None, blue=blue, red=red, seed=0), Path(run))
+    match = players(ReplayConfig(run=run, trust=None, blue=blue, red=red, seed=0))
     print(shown(table([grab for film in films(match, int(games)) for grab in grabs(film)])))
