@@ -4,7 +4,8 @@ from numba import njit
 
 from berteam_cli.acting import fixed_policies, joined
 from berteam_cli.env.base import blank_results
-from berteam_cli.env.mctf import blank_scratch, settle
+from berteam_cli.env.mctf import blank_scratch
+from berteam_cli.env.mctf_game import settle
 from berteam_cli.games import pairings, seeds_of
 from mctf import play_scripted
 from mctf.parallel import parallel_env

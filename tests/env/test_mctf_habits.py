@@ -6,7 +6,8 @@ from numba import njit
 
 from berteam_cli.acting import fixed_policies, joined
 from berteam_cli.env.base import blank_results
-from berteam_cli.env.mctf import blank_scratch, settle, watch
+from berteam_cli.env.mctf import blank_scratch
+from berteam_cli.env.mctf_game import settle, watch
 from berteam_cli.games import as_side_0, both_sides, pairings
 from berteam_cli.outcomes import HABITS
 from mctf.rewards import TERMS
