@@ -55,6 +55,7 @@ picture: setup ## the pictures of the README and docs
 	$(BIN)/berteam train experiment=paper_fixed out=outputs/picture on_exists=overwrite
 	$(BIN)/python docs/picture.py outputs/picture docs/picture.png
 	$(BIN)/python docs/field.py docs/field.png
+	$(BIN)/python docs/results/course.py docs/results/course.png
 
 SMALL := outputs/results_small
 BOTH := hydra/launcher=joblib hydra.launcher.n_jobs=2

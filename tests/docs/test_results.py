@@ -18,7 +18,7 @@ from tests.docs.pages import ROOT
 from tests.test_config import composed
 
 RESULTS = ROOT / "docs" / "results"
-SCRIPTS = ("tables", "selection", "roles", "levers", "curves", "grabs")
+SCRIPTS = ("tables", "selection", "roles", "levers", "curves", "grabs", "course")
 
 
 @pytest.fixture
@@ -155,3 +155,29 @@ def test_a_run_s_course_is_that_of_its_looks_and_of_the_games_between(scripts, t
     assert own_drawn[1:].tolist() == [0.5, 1.0]
     assert np.isnan(own_drawn[0])  # no game before the first look
     assert grabs[1:].tolist() == [1.5, 2.0]
+
+
+def test_a_course_is_the_mean_of_the_looks_since_the_point_before(scripts):
+    table = pd.DataFrame(
+        {
+            "job": [0, 0, 0, 0, 0, 0, 3],
+            "epoch": [0, 10, 11, 100, 100, 100, 100],
+            "who": ["choice", "choice", "choice", "choice", "best_team", "choice", "choice"],
+            "opponent": ["all", "all", "all", "all", "all", "random + random", "all"],
+            "games": 10,
+            "wins": [9, 1, 3, 5, 0, 0, 0],
+            "elo": [800.0, 900.0, 920.0, 1000.0, 1.0, 2.0, 3.0],
+        }
+    )
+    points = scripts.course.smoothed(scripts.course.looks(table, 0), games_per_epoch=10)
+    assert points.games.tolist() == [105.0, 1000.0]
+    assert points.elo.tolist() == [910.0, 1000.0]
+    assert points.won.tolist() == pytest.approx([0.2, 0.5])
+
+
+def test_all_courses_are_drawn(scripts, tmp_path):
+    for course in scripts.course.COURSES:
+        looked_at = scripts.course.looks(pd.read_csv(RESULTS / course.table), course.job)
+        assert len(scripts.course.smoothed(looked_at, course.games_per_epoch)) > 1
+    scripts.course.draw(tmp_path / "course.png")
+    assert (tmp_path / "course.png").read_bytes().startswith(b"\x89PNG")
