@@ -17,6 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from curves import of_choice
 
 HERE = Path(__file__).parent
 POINTS = 8  # for each tenfold of games
@@ -57,17 +58,16 @@ COURSES = (
 
 def looks(table: pd.DataFrame, job: int | None) -> pd.DataFrame:
     """Returns the looks at the choice of one run, all fixed teams together, by epoch."""
-    of_choice = table[(table.who == "choice") & (table.opponent == "all")]
-    return (of_choice if job is None else of_choice[of_choice.job == job]).set_index("epoch")
+    return of_choice(table if job is None else table[table.job == job])
 
 
-def smoothed(of_choice: pd.DataFrame, games_per_epoch: int) -> pd.DataFrame:
+def smoothed(choice: pd.DataFrame, games_per_epoch: int) -> pd.DataFrame:
     """Returns games, elo and won: means of the looks between points that are even on a logarithmic axis."""
     values = pd.DataFrame(
         {
-            "games": of_choice.index * games_per_epoch,
-            "elo": of_choice.elo.to_numpy(),
-            "won": (of_choice.wins / of_choice.games).to_numpy(),
+            "games": choice.index * games_per_epoch,
+            "elo": choice.elo.to_numpy(),
+            "won": (choice.wins / choice.games).to_numpy(),
         }
     )
     values = values[values.games > 0]  # a logarithm has no place for the start
@@ -78,8 +78,8 @@ def draw(picture: Path) -> None:
     """Draws all courses, and the strengths to compare them with."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
     for course in COURSES:
-        of_choice = looks(pd.read_csv(HERE / course.table), course.job)
-        points = smoothed(of_choice, course.games_per_epoch)
+        choice = looks(pd.read_csv(HERE / course.table), course.job)
+        points = smoothed(choice, course.games_per_epoch)
         for axes, what in ((left, "elo"), (right, "won")):
             axes.plot(points.games, points[what], color=course.color, label=course.label if axes is left else None)
     lines = ((BEST_PAIR, "best scripted pair"), (NO_WIN_NO_LOSS, "all games drawn"), (PAPER, "the paper, whole"))

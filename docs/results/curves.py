@@ -26,10 +26,14 @@ QUANTITIES = {
 }
 
 
+def of_choice(looks: pd.DataFrame) -> pd.DataFrame:
+    """Returns the looks at the selector's choice, all fixed teams together, by epoch."""
+    return looks[(looks.opponent == "all") & (looks.who == "choice")].set_index("epoch")
+
+
 def of_run(folder: Path) -> pd.DataFrame:
     """Returns the quantities of one run, a column each, by the epochs of its looks."""
-    looks = pd.read_csv(folder / "evaluation.csv")
-    choice = looks[(looks.opponent == "all") & (looks.who == "choice")].set_index("epoch")
+    choice = of_choice(pd.read_csv(folder / "evaluation.csv"))
     columns = ["epoch", "blue_score", "blue_grabs", "red_grabs"]
     games = pd.read_csv(folder / "games.csv", usecols=columns)
     since = games.groupby(choice.index.to_numpy()[np.searchsorted(choice.index, games.epoch)])
