@@ -29,36 +29,44 @@ class Course(NamedTuple):
 
     Attributes:
         table: the looks.
-        job: of a table that holds several runs; None where it holds one.
+        variant: of a table that holds several, of which each seed is a line; None where it holds one run.
         games_per_epoch: of the training.
         color: of the line.
         label: in the legend; lines without one are of the same kind as the labelled one before.
     """
 
     table: str
-    job: int | None
+    variant: str | None
     games_per_epoch: int
     color: str
     label: str | None
 
 
+OF_THE_PAPER = (
+    ("paper_coevolution selector=berteam optimizer=coevolution", 25, "black", "paper_coevolution"),
+    ("paper_comparison selector=berteam optimizer=coevolution", 16, "tab:blue", "comparison, BERTeam, coevolution"),
+    (
+        "paper_comparison selector=berteam optimizer=coevolution optimizer.replacements=0",
+        *(16, "tab:purple", "comparison, BERTeam, nobody cloned"),
+    ),
+    ("paper_comparison selector=mcaa optimizer=coevolution", 16, "tab:cyan", "comparison, MCAA, coevolution"),
+    ("paper_comparison selector=berteam optimizer=mapelites", 16, "tab:green", "comparison, BERTeam, MAP-Elites"),
+    ("paper_comparison selector=mcaa optimizer=mapelites", 16, "tab:olive", "comparison, MCAA, MAP-Elites"),
+)
 COURSES = (
     Course("night/16/evaluation.csv", None, 32, "tab:red", "strong (six seeds)"),
     *(Course(f"strong/{seed}/evaluation.csv", None, 32, "tab:red", None) for seed in (17, 18, 19, 20, 21)),
     Course("hour/6/evaluation.csv", None, 32, "tab:orange", "strong_past: no exploiters (five seeds)"),
     *(Course(f"strong_past/{seed}/evaluation.csv", None, 32, "tab:orange", None) for seed in (7, 8, 9, 10)),
-    Course("paper_whole_looks.csv", 0, 25, "black", "paper_coevolution"),
-    Course("paper_whole_looks.csv", 3, 16, "tab:blue", "paper_comparison, coevolution, BERTeam"),
-    Course("paper_whole_looks.csv", 15, 16, "tab:purple", "the same, BERTeam, nobody cloned"),
-    Course("paper_whole_looks.csv", 6, 16, "tab:cyan", "paper_comparison, coevolution, MCAA"),
-    Course("paper_whole_looks.csv", 9, 16, "tab:green", "paper_comparison, MAP-Elites, BERTeam"),
-    Course("paper_whole_looks.csv", 12, 16, "tab:olive", "paper_comparison, MAP-Elites, MCAA"),
+    *(Course("paper_whole_looks.csv", f"experiment={words}", *drawn) for words, *drawn in OF_THE_PAPER),
 )
 
 
-def looks(table: pd.DataFrame, job: int | None) -> pd.DataFrame:
-    """Returns the looks at the choice of one run, all fixed teams together, by epoch."""
-    return of_choice(table if job is None else table[table.job == job])
+def lines(table: pd.DataFrame, variant: str | None) -> list[pd.DataFrame]:
+    """Returns for each run of a variant the looks at its choice, all fixed teams together, by epoch."""
+    if variant is None:
+        return [of_choice(table)]
+    return [of_choice(run) for _, run in table[table.variant == variant].groupby("seed")]
 
 
 def smoothed(choice: pd.DataFrame, games_per_epoch: int) -> pd.DataFrame:
@@ -78,12 +86,12 @@ def draw(picture: Path) -> None:
     """Draws all courses, and the strengths to compare them with."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 5), layout="constrained")
     for course in COURSES:
-        choice = looks(pd.read_csv(HERE / course.table), course.job)
-        points = smoothed(choice, course.games_per_epoch)
-        for axes, what in ((left, "elo"), (right, "won")):
-            axes.plot(points.games, points[what], color=course.color, label=course.label if axes is left else None)
-    lines = ((BEST_PAIR, "best scripted pair"), (NO_WIN_NO_LOSS, "all games drawn"), (PAPER, "the paper, whole"))
-    for elo, said in lines:
+        for seed, choice in enumerate(lines(pd.read_csv(HERE / course.table), course.variant)):
+            points, label = smoothed(choice, course.games_per_epoch), None if seed else course.label
+            left.plot(points.games, points.elo, color=course.color, label=label)
+            right.plot(points.games, points.won, color=course.color)
+    strengths = ((BEST_PAIR, "best scripted pair"), (NO_WIN_NO_LOSS, "all games drawn"), (PAPER, "the paper, whole"))
+    for elo, said in strengths:
         left.axhline(elo, color="0.6", linestyle=":", linewidth=1)
         left.text(
             1.0, elo, said, transform=left.get_yaxis_transform(), ha="right", va="bottom", fontsize=8, color="0.4"

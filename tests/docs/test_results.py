@@ -12,13 +12,17 @@ from berteam_cli.command.replay import players
 from berteam_cli.compose import check, prepare
 from berteam_cli.config import checked
 from berteam_cli.sweep.folder import Sweep
-from mctf.rules import BLUE
-from mctf.state import CAPTURES, GRABS
+from mctf.observe import observation_size
+from mctf.rules import BLUE, make_rules
+from mctf.scripted import NAMES
+from mctf.start import reset
+from mctf.state import CAPTURES, GRABS, empty
+from tests.command.conftest import SMALL_BERTEAM, TINY
 from tests.docs.pages import ROOT
 from tests.test_config import composed
 
 RESULTS = ROOT / "docs" / "results"
-SCRIPTS = ("tables", "selection", "roles", "levers", "curves", "grabs", "course")
+SCRIPTS = ("tables", "selection", "roles", "levers", "curves", "grabs", "course", "whole", "lure")
 
 
 @pytest.fixture
@@ -83,6 +87,40 @@ def test_grabs_are_those_of_the_game(scripts):
         found = scripts.grabs.grabs(film)
         assert len(found) == film.score[-1, BLUE, GRABS] > 0
         assert sum(grab.home for grab in found) == film.score[-1, BLUE, CAPTURES]
+
+
+@pytest.mark.parametrize(
+    ("to", "action"), [((-9, 0), 4), ((0, 9), 2), ((0, -9), 6), ((9, 0), 0), ((-9, 8), 3), ((0.5, 0), 16)]
+)
+def test_a_plan_s_vehicle_turns_to_its_place(scripts, to, action):
+    rules = make_rules()
+    state = empty(1, rules)
+    reset(state, 0, rules)
+    assert state.heading[0, 0] == -90.0  # blue has the right half and faces the left one
+    assert scripts.lure.heads_for(state, 0, state.pos[0, 0, 0] + to[0], state.pos[0, 0, 1] + to[1]) == action
+
+
+def test_a_plan_is_worth_what_it_leads_to(scripts):
+    lure, rules = scripts.lure, make_rules()
+    state, seen = empty(1, rules), np.zeros((4, observation_size(rules)))
+    raid, stay = (np.full((2, lure.SPANS, 2), place) for place in (rules.red_home_m, rules.blue_home_m))
+    nobody, hard = (np.array([NAMES.index(name)] * 2) for name in ("nothing", "defend_hard"))
+    assert lure.play(state, seen, stay, nobody, rules)[::2] == (0.0, False)
+    worth, apart, won = lure.play(state, seen, raid, nobody, rules)
+    assert won
+    assert 10.0 < apart < 40.0  # those who do nothing start 30 m from their flag
+    assert 150.0 < worth < 2 * 80.0 + 30.0  # the flag is 75 m from the middle, and those stay 30 m away
+    assert not lure.play(state, seen, raid, hard, rules)[2]
+
+
+def test_a_way_past_a_hard_defender_is_found_and_found_again(scripts):
+    easy_hard, hard = (
+        np.array([NAMES.index(name) for name in (other, "defend_hard")]) for other in ("defend_easy", "defend_hard")
+    )
+    way = scripts.lure.found(easy_hard, 8000, 3)
+    assert way == scripts.lure.found(easy_hard, 8000, 3)
+    assert way.time_s <= 420.0
+    assert scripts.lure.found(hard, 5, 0) is None
 
 
 def test_roles_are_what_members_add_to_their_teams(scripts):
@@ -157,10 +195,77 @@ def test_a_run_s_course_is_that_of_its_looks_and_of_the_games_between(scripts, t
     assert grabs[1:].tolist() == [1.5, 2.0]
 
 
+def test_whole_runs_are_gathered_from_what_they_left(scripts, berteam, monkeypatch, tmp_path):
+    words = ["experiment=paper_comparison", "population=islands4x3", *TINY, *SMALL_BERTEAM, "evaluation.games=560"]
+    berteam("train", *words, "optimizer.replacements=0", "seed=3", "evaluate_every=2", "out=run")
+    whole_run = tmp_path / "run"
+    monkeypatch.setattr(scripts.whole, "HERE", tmp_path)
+    monkeypatch.setattr(scripts.whole, "SPAN", 2)
+    scripts.whole.gather([whole_run])
+    runs, looks, games = (pd.read_csv(tmp_path / file) for file in scripts.whole.TABLES.values())
+    variant = "experiment=paper_comparison selector=berteam optimizer=coevolution optimizer.replacements=0"
+    for table in (runs, looks, games):
+        assert table.variant.unique().tolist() == [variant]
+        assert table.seed.unique().tolist() == [3]
+    played, elo = pd.read_csv(whole_run / "games.csv"), pd.read_csv(whole_run / "elo.csv")
+    assert games.to_epoch.tolist() == [2, 4]
+    assert games.games.sum() == len(played)
+    assert games.decided.tolist() == [
+        (played.blue_score[x] != 0.5).sum() for x in (played.epoch <= 2, played.epoch > 2)
+    ]
+    assert games.tags.sum() == played.blue_tags.sum() + played.red_tags.sum()
+    assert (runs.rated_wins[0], runs.rated_games[0]) == (elo.wins.sum(), elo.games.sum())
+    assert (runs.best_elo[0], runs.best_elo_low[0]) == (elo.elo.max(), elo.elo_low[0])
+    assert runs.replaced[0] == runs.places_replaced[0] == runs.removed_fitter[0] == 0
+    assert looks.epoch.unique().tolist() == [0, 2, 4]
+    (row,) = scripts.whole.courses(looks, games).to_dict("records")
+    choice = scripts.curves.of_choice(looks).loc[2]
+    shares = choice.wins / choice.games, games.decided[0] / games.games[0]
+    assert row == row | {
+        "": "BERTeam, nobody cloned, 3",
+        "to 2": f"{choice.elo:.0f} / {shares[0]:.2f} / {shares[1]:.3f}",
+    }
+
+
+def test_own_games_are_counted_span_by_span(scripts, monkeypatch, tmp_path):
+    monkeypatch.setattr(scripts.whole, "SPAN", 10)
+    games = {"epoch": [1, 10, 11, 20, 21], "blue_score": [1.0, 0.0, 0.5, 0.5, 0.0]}
+    games |= {f"{side}_{what}": [1, 0, 0, 2, 3] for side in ("blue", "red") for what in ("captures", "grabs", "tags")}
+    pd.DataFrame(games).to_csv(tmp_path / "games.csv")
+    counted = scripts.whole.own_games(tmp_path)
+    assert counted.to_epoch.tolist() == [10, 20, 30]
+    assert counted.games.tolist() == [2, 2, 1]
+    assert counted.decided.tolist() == [2, 0, 1]
+    assert counted.grabs.tolist() == [2, 4, 6]
+
+
+def test_who_was_replaced_is_counted(scripts, tmp_path):
+    fitness = {
+        "removed": [3, 4, 3],
+        "removed_fitness": [900.0, 1100.0, 990.0],
+        "parent_fitness": [1000.0, 1000.0, 1000.0],
+    }
+    elo = {"elo_low": [1.0, 0.0], "elo_high": [3.0, 2.0], "games": 5, "wins": [2, 1], "draws": [3, 0], "losses": [0, 4]}
+    for name, table in (("summary", {"best_elo": [2.0]}), ("elo", elo), ("generations", fitness)):
+        pd.DataFrame(table).to_csv(tmp_path / f"{name}.csv")
+    (row,) = scripts.whole.ended(tmp_path).to_dict("records")
+    assert (row["replaced"], row["places_replaced"], row["removed_fitter"]) == (3, 2, 1)
+    assert (row["best_elo_low"], row["best_elo_high"]) == (1.0, 3.0)
+    assert [row[f"rated_{x}"] for x in ("games", "wins", "draws", "losses")] == [10, 3, 3, 4]
+
+
+def test_the_page_shows_the_whole_runs_that_are_shipped(scripts):
+    runs, looks, games = (pd.read_csv(RESULTS / file) for file in scripts.whole.TABLES.values())
+    page = (ROOT / "docs" / "results.md").read_text().splitlines()
+    for line in scripts.whole.shown(runs, looks, games).splitlines():
+        assert line in page
+
+
 def test_a_course_is_the_mean_of_the_looks_since_the_point_before(scripts):
     table = pd.DataFrame(
         {
-            "job": [0, 0, 0, 0, 0, 0, 3],
+            "variant": ["a", "a", "a", "a", "a", "a", "b"],
+            "seed": 0,
             "epoch": [0, 10, 11, 100, 100, 100, 100],
             "who": ["choice", "choice", "choice", "choice", "best_team", "choice", "choice"],
             "opponent": ["all", "all", "all", "all", "all", "random + random", "all"],
@@ -169,7 +274,8 @@ def test_a_course_is_the_mean_of_the_looks_since_the_point_before(scripts):
             "elo": [800.0, 900.0, 920.0, 1000.0, 1.0, 2.0, 3.0],
         }
     )
-    points = scripts.course.smoothed(scripts.course.looks(table, 0), games_per_epoch=10)
+    (run,) = scripts.course.lines(table, "a")
+    points = scripts.course.smoothed(run, games_per_epoch=10)
     assert points.games.tolist() == [105.0, 1000.0]
     assert points.elo.tolist() == [910.0, 1000.0]
     assert points.won.tolist() == pytest.approx([0.2, 0.5])
@@ -177,7 +283,8 @@ def test_a_course_is_the_mean_of_the_looks_since_the_point_before(scripts):
 
 def test_all_courses_are_drawn(scripts, tmp_path):
     for course in scripts.course.COURSES:
-        looked_at = scripts.course.looks(pd.read_csv(RESULTS / course.table), course.job)
-        assert len(scripts.course.smoothed(looked_at, course.games_per_epoch)) > 1
+        runs = scripts.course.lines(pd.read_csv(RESULTS / course.table), course.variant)
+        assert runs
+        assert all(len(scripts.course.smoothed(run, course.games_per_epoch)) > 1 for run in runs)
     scripts.course.draw(tmp_path / "course.png")
     assert (tmp_path / "course.png").read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,134 @@
+"""Prints how whole runs of the paper's setting went, as tables of Markdown: python docs/results/whole.py [RUN ...].
+
+With runs, the tables beside this file (paper_whole.csv, _looks.csv and _games.csv) are written anew from them first, so
+all runs are to be named; without, those tables are read. A variant is what a run was called with, but for its seed; the
+columns of each table begin with these two.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pandas as pd
+from curves import of_choice
+from tables import markdown, spoken
+
+HERE = Path(__file__).parent
+SPAN = 500  # epochs that a column of the courses holds
+NAMES = {"berteam": "BERTeam", "mcaa": "MCAA", "coevolution": "coevolution", "mapelites": "MAP-Elites"}
+PAPER = {  # its expected Elos after the whole run
+    "experiment=paper_coevolution selector=berteam optimizer=coevolution": "930",
+    "experiment=paper_comparison selector=berteam optimizer=coevolution": "919",
+    "experiment=paper_comparison selector=mcaa optimizer=coevolution": "817",
+    "experiment=paper_comparison selector=berteam optimizer=mapelites": "883",
+    "experiment=paper_comparison selector=mcaa optimizer=mapelites": "809",
+}
+TABLES = {"runs": "paper_whole.csv", "looks": "paper_whole_looks.csv", "games": "paper_whole_games.csv"}
+
+
+def called(run: Path) -> tuple[str, int]:
+    """Returns the variant of a run and its seed."""
+    manifest = json.loads((run / "manifest.json").read_text())
+    said = dict(word.split("=", 1) for word in manifest["command"][1:] if "=" in word)
+    words = {"experiment": said["experiment"], "selector": "berteam", "optimizer": "coevolution"} | said
+    kept = [key for key in words if key in ("experiment", "selector", "optimizer") or key.startswith("optimizer.")]
+    return " ".join(f"{key}={words[key]}" for key in kept), int(manifest["seed"])
+
+
+def ended(run: Path) -> pd.DataFrame:
+    """Returns what a run came to: its summary, its best team's interval, the games of those rated, who was replaced."""
+    summary, elo, clones = (pd.read_csv(run / f"{table}.csv") for table in ("summary", "elo", "generations"))
+    return summary.assign(
+        best_elo_low=elo.elo_low[0],
+        best_elo_high=elo.elo_high[0],
+        **{f"rated_{x}": elo[x].sum() for x in ("games", "wins", "draws", "losses")},
+        replaced=len(clones),
+        places_replaced=clones.removed.nunique(),
+        removed_fitter=(clones.removed_fitness > clones.parent_fitness).sum(),
+    )
+
+
+def spans(epochs: pd.Series | pd.Index) -> pd.Series:
+    """Returns for each epoch from 1 on the last one of its column."""
+    return (-(-epochs // SPAN) * SPAN).rename("to_epoch")
+
+
+def own_games(run: Path) -> pd.DataFrame:
+    """Returns what happened in the training's own games, a row for each span."""
+    games = pd.read_csv(run / "games.csv")
+    sums = {x: games[f"blue_{x}"] + games[f"red_{x}"] for x in ("captures", "grabs", "tags")}
+    happened = pd.DataFrame({"games": 1, "decided": games.blue_score != 0.5, **sums})
+    return happened.groupby(spans(games.epoch)).sum().astype(int).reset_index()
+
+
+def gather(runs: list[Path]) -> None:
+    """Writes the tables beside this file."""
+    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
+    for run in runs:
+        looks = pd.read_csv(run / "evaluation.csv")
+        of_run = {"runs": ended(run), "looks": looks[looks.opponent == "all"], "games": own_games(run)}
+        variant, seed = called(run)
+        for name, rows in of_run.items():
+            rows.insert(0, "variant", variant)
+            rows.insert(1, "seed", seed)
+            parts[name].append(rows)
+    for name, file in TABLES.items():
+        pd.concat(parts[name]).to_csv(HERE / file, index=False)
+
+
+def named(variant: str) -> str:
+    """Returns what a variant is called on the page."""
+    said = dict(word.split("=", 1) for word in variant.split())
+    return f"{NAMES[said['selector']]}, " + (
+        "nobody cloned" if said.get("optimizer.replacements") == "0" else NAMES[said["optimizer"]]
+    )
+
+
+def ends(runs: pd.DataFrame, games: pd.DataFrame) -> pd.DataFrame:
+    """Returns the table of what each variant came to, its seeds side by side."""
+    rows = []
+    for variant, of_variant in runs.groupby("variant", sort=False):
+        last = games[(games.variant == variant) & (games.to_epoch == games.to_epoch.max())].set_index("seed")
+        bounds = of_variant[["expected_elo", "expected_elo_low", "expected_elo_high"]].to_numpy()
+        elos = [f"{elo:.0f} [{low:.0f}, {high:.0f}]" for elo, low, high in bounds]
+        rated = of_variant[["rated_wins", "rated_draws", "rated_losses"]].sum()
+        rows.append(
+            {
+                "selector, optimizer": named(variant),
+                "the paper": PAPER.get(variant, ""),
+                "expected Elo, seed by seed": "; ".join(elos),
+                "mean": spoken(of_variant.expected_elo.to_numpy()) if len(elos) > 1 else "",
+                "games of the teams rated: won / drawn / lost": " / ".join(f"{x:,}" for x in rated),
+                "own games decided in the last 500 epochs": ", ".join(f"{x:.3f}" for x in last.decided / last.games),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def courses(looks: pd.DataFrame, games: pd.DataFrame) -> pd.DataFrame:
+    """Returns the table of how each run went: mean Elo of its looks, share of their games won, of own games decided."""
+    rows = []
+    for (variant, seed), of_run in looks.groupby(["variant", "seed"], sort=False):
+        choice = of_choice(of_run).loc[1:]
+        since = choice.groupby(spans(choice.index))
+        own = games[(games.variant == variant) & (games.seed == seed)].set_index("to_epoch")
+        shares = zip(since.elo.mean(), since.wins.sum() / since.games.sum(), own.decided / own.games, strict=True)
+        cells = [f"{elo:.0f} / {won:.2f} / {decided:.3f}" for elo, won, decided in shares]
+        columns = [f"to {epoch:,}" for epoch in own.index]
+        rows.append({"": f"{named(variant)}, {seed}"} | dict(zip(columns, cells, strict=True)))
+    return pd.DataFrame(rows)
+
+
+def shown(*tables: pd.DataFrame) -> str:
+    """Returns the page's tables of the comparison; ``tables`` are those of runs, looks and games."""
+    runs, looks, games = (table[table.variant.str.contains("paper_comparison")] for table in tables)
+    return f"{markdown(ends(runs, games))}\n\n{markdown(courses(looks, games))}"
+
+
+if __name__ == "__main__":
+    if sys.argv[1:]:
+        gather([Path(name) for name in sys.argv[1:]])
+    runs, looks, games = (pd.read_csv(HERE / file) for file in TABLES.values())
+    print(shown(runs, looks, games))
