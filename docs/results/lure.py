@@ -18,6 +18,7 @@ import pandas as pd
 from numba import njit
 from tables import markdown
 
+from mctf.commands import STOP
 from mctf.kernel import RUNNING, finished, lead, step
 from mctf.observe import observation_size, observe
 from mctf.rules import Rules, make_rules
@@ -26,7 +27,7 @@ from mctf.start import reset
 from mctf.state import State, empty
 
 SPANS, SPAN_S = 10, 42
-STOP, TURNS = 16, 8
+TURNS = 8  # that an action may ask for, 45 deg apart
 DRAWN = 0.25  # of the games: with plans that are drawn anew
 CHANGES_M, CHANGED = (2.0, 8.0, 25.0), (0.1, 0.3)  # deviations of changes, and shares of the places that change
 

@@ -19,7 +19,6 @@ HERE = Path(__file__).parent
 SPAN = 500  # epochs that a column of the courses holds
 NAMES = {"berteam": "BERTeam", "mcaa": "MCAA", "coevolution": "coevolution", "mapelites": "MAP-Elites"}
 PAPER = {  # its expected Elos after the whole run
-    "experiment=paper_coevolution selector=berteam optimizer=coevolution": "930",
     "experiment=paper_comparison selector=berteam optimizer=coevolution": "919",
     "experiment=paper_comparison selector=mcaa optimizer=coevolution": "817",
     "experiment=paper_comparison selector=berteam optimizer=mapelites": "883",
