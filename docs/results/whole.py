@@ -7,13 +7,14 @@ columns of each table begin with these two.
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
 import pandas as pd
 from curves import of_choice
 from tables import markdown, spoken
+
+from berteam_cli.folder import read_manifest
 
 HERE = Path(__file__).parent
 SPAN = 500  # epochs that a column of the courses holds
@@ -29,7 +30,7 @@ TABLES = {"runs": "paper_whole.csv", "looks": "paper_whole_looks.csv", "games": 
 
 def called(run: Path) -> tuple[str, int]:
     """Returns the variant of a run and its seed."""
-    manifest = json.loads((run / "manifest.json").read_text())
+    manifest = read_manifest(run)
     said = dict(word.split("=", 1) for word in manifest["command"][1:] if "=" in word)
     words = {"experiment": said["experiment"], "selector": "berteam", "optimizer": "coevolution"} | said
     kept = [key for key in words if key in ("experiment", "selector", "optimizer") or key.startswith("optimizer.")]
