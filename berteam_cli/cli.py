@@ -1,4 +1,4 @@
-"""The command: a word, and what follows it. Only this module, config.py, compose.py and sweep/plan.py know Hydra.
+"""The command: a word, and what follows it. Only it, overrides.py, compose.py, config.py and sweep/plan.py know Hydra.
 
 Exit codes: 0 done, 2 the input is wrong, 3 the run failed, 130 interrupted.
 """
@@ -108,7 +108,8 @@ def composed(word: str, words: list[str]) -> None:
 
         print(help_text(word))
         return
-    from berteam_cli.compose import arguments, prepare, spelt_out  # noqa: PLC0415
+    from berteam_cli.compose import prepare  # noqa: PLC0415
+    from berteam_cli.overrides import arguments, spelt_out  # noqa: PLC0415
 
     prepare()
     words = spelt_out(words)
@@ -136,7 +137,8 @@ def checked_words(word: str, words: list[str]) -> DictConfig:
     Raises:
         InputError: they are wrong.
     """
-    from berteam_cli.compose import arguments, check  # noqa: PLC0415
+    from berteam_cli.compose import check  # noqa: PLC0415
+    from berteam_cli.overrides import arguments  # noqa: PLC0415
     from berteam_cli.sweep.plan import check_launcher  # noqa: PLC0415
 
     given = arguments(words)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from hydra import compose, initialize_config_module
-from hydra._internal.utils import get_args_parser
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.object_type import ObjectType
-from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep, Override
 from hydra.core.plugins import Plugins
 from hydra.errors import HydraException
@@ -21,20 +19,13 @@ from omegaconf.errors import OmegaConfBaseException
 from berteam_cli.catalogue import groups
 from berteam_cli.config import checked, one_line, register
 from berteam_cli.errors import InputError, did_you_mean
+from berteam_cli.overrides import arguments, jobs, parsed
 from hydra_plugins.berteam.ray_launcher import RayLauncher
 from hydra_plugins.berteam.sweeper import BerteamSweeper
 
 CONF = "berteam_cli.conf"
 REFUSALS = (HydraException, OmegaConfBaseException, OSError, OverflowError, ValueError, RecursionError)
 """What composing raises: the first two say what is wrong, the others come of numbers and names that are too long."""
-
-
-UNUSED = {
-    "config_path": "the yaml files are the package's; --config-dir DIR adds a folder of yours",
-    "package": "every key has its place in the config; see --cfg job",
-    "experimental_rerun": "it unpickles a file, which may run code in it; name the same overrides again",
-}
-"""Flags of Hydra that have no place here, and why."""
 
 
 def prepare() -> None:
@@ -46,31 +37,6 @@ def prepare() -> None:
     for plugin in (BerteamSweeper, RayLauncher):
         Plugins.instance().register(plugin)
     OmegaConf.register_new_resolver("eighth_of", lambda epochs: int(epochs) // 8, replace=True)
-
-
-def arguments(words: list[str]) -> Any:
-    """Returns Hydra's reading of the command line after the sub-command.
-
-    Raises:
-        InputError: it has a flag that does not exist.
-    """
-    parser = get_args_parser()
-    parser.allow_abbrev = False  # one name for each flag
-
-    def refuse(message: str) -> None:
-        raise InputError(f"{message}; see --help.")
-
-    parser.error = refuse  # type: ignore[assignment,method-assign]
-    given = parser.parse_args(words)
-    for name, why in UNUSED.items():
-        if getattr(given, name, None):
-            raise InputError(f"--{name.replace('_', '-')} cannot be used here: {why}.")
-    said = [f"--{name}" for name in ("run", "multirun", "cfg", "info") if getattr(given, name)]
-    if len(said) > 1:
-        raise InputError(f"{' and '.join(said)} cannot be used together; use one of them.")
-    if given.resolve and not given.cfg:
-        raise InputError("--resolve is for --cfg job, which it lets print values in place of what stands for them.")
-    return given
 
 
 def check(command: str, words: list[str], verify: Callable[[Any, list[str]], object]) -> DictConfig:
@@ -142,54 +108,6 @@ def check_sweep_folder(overrides: list[Override]) -> None:
                     f"hydra.sweep.dir={folder} holds a sweep already; choose another folder, "
                     f"or go on with it: berteam sweep --resume {folder}"
                 )
-
-
-def parsed(overrides: list[str]) -> list[Override]:
-    """Returns the overrides as Hydra reads them.
-
-    Raises:
-        InputError: one is not of the form key=value.
-    """
-    read: list[Override] = []
-    for text in overrides:
-        try:
-            read += OverridesParser.create().parse_overrides([text])
-        except HydraException as error:
-            raise InputError(
-                f"{text!r} cannot be read as key=value: {str(error).splitlines()[0].rstrip('.')}."
-            ) from error
-        except (ValueError, RecursionError) as error:  # of python itself, which says nothing of the key
-            key = text.partition("=")[0]
-            raise InputError(f"{key} cannot be read: its value is too long a number, or too deep a list.") from error
-    return read
-
-
-SHORT = {"selector.observations": "selector.observations.use"}
-"""What may be said for a longer key: a part of the config stands for the one of its values that decides all others."""
-
-
-def spelt_out(words: list[str]) -> list[str]:
-    """Returns the words of a command line with SHORT keys replaced by the keys they stand for."""
-    spelt = []
-    for word in words:
-        key, equals, value = word.partition("=")
-        spelt.append(f"{SHORT.get(key, key)}={value}" if equals and not value.startswith("{") else word)
-    return spelt
-
-
-def jobs(overrides: list[Override], *, sweep: bool) -> Iterator[list[Override]]:
-    """Yields lists of overrides in which every value of every sweep occurs once, the others at their first."""
-    plain = [x for x in overrides if not (sweep and x.is_sweep_override())]
-    values = [
-        parsed([f"{x.get_key_element()}={value}" for value in x.sweep_string_iterator()])
-        for x in overrides
-        if sweep and (x.is_choice_sweep() or x.is_range_sweep())
-    ]
-    first = [options[0] for options in values]
-    yield plain + first
-    for k, options in enumerate(values):
-        for other in options[1:]:
-            yield [*plain, *first[:k], other, *first[k + 1 :]]
 
 
 def check_learner(config: DictConfig, overrides: list[Override]) -> None:

@@ -9,8 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from berteam_cli.compose import arguments, prepare
+from berteam_cli.compose import prepare
 from berteam_cli.errors import InputError, RunError
+from berteam_cli.overrides import arguments
 from berteam_cli.quiet import written
 from berteam_cli.sweep import plan
 from berteam_cli.sweep.folder import LOCKS, TABLE, Sweep, working

@@ -16,8 +16,9 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.core.override_parser.types import Override
 from omegaconf import OmegaConf
 
-from berteam_cli.compose import CONF, arguments, parsed
+from berteam_cli.compose import CONF
 from berteam_cli.errors import InputError, did_you_mean
+from berteam_cli.overrides import arguments, parsed
 from berteam_cli.sweep.folder import Sweep
 
 OURS = "hydra_plugins.berteam.sweeper.BerteamSweeper"

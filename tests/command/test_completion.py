@@ -9,7 +9,8 @@ import pytest
 from hydra import initialize_config_module
 
 from berteam_cli import catalogue
-from berteam_cli.compose import CONF, choices, composed, keys, parsed, prepare
+from berteam_cli.compose import CONF, choices, composed, keys, prepare
+from berteam_cli.overrides import parsed
 from tests.command.conftest import BERTEAM
 from tests.command.terminals import Terminal
 

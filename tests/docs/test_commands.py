@@ -13,7 +13,8 @@ import subprocess
 import pytest
 
 from berteam_cli import cli
-from berteam_cli.compose import check, prepare, spelt_out
+from berteam_cli.compose import check, prepare
+from berteam_cli.overrides import spelt_out
 from tests.docs.pages import PAGES, ROOT, blocks, inline_commands
 
 SMALL = ["epochs=2", "games_per_epoch=4", "record_every=2", "evaluation.games=0", "payoff_steps=0"]
