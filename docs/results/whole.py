@@ -1,7 +1,7 @@
 """Prints how whole runs of the paper's setting went, as tables of Markdown: python docs/results/whole.py [RUN ...].
 
-With runs, the tables beside this file (paper_whole.csv, _looks.csv and _games.csv) are written anew from them first, so
-all runs are to be named; without, those tables are read. A variant is what a run was called with, but for its seed; the
+With runs, their rows in the tables beside this file (paper_whole.csv, _looks.csv and _games.csv) are written first: a
+run takes the place of the one of its variant and seed. A variant is what a run was called with, but for its seed; the
 columns of each table begin with these two.
 """
 
@@ -63,19 +63,24 @@ def own_games(run: Path) -> pd.DataFrame:
     return happened.groupby(spans(games.epoch)).sum().astype(int).reset_index()
 
 
-def gather(runs: list[Path]) -> None:
-    """Writes the tables beside this file."""
-    parts: dict[str, list[pd.DataFrame]] = {name: [] for name in TABLES}
-    for run in runs:
-        looks = pd.read_csv(run / "evaluation.csv")
-        of_run = {"runs": ended(run), "looks": looks[looks.opponent == "all"], "games": own_games(run)}
-        variant, seed = called(run)
-        for name, rows in of_run.items():
-            rows.insert(0, "variant", variant)
-            rows.insert(1, "seed", seed)
-            parts[name].append(rows)
-    for name, file in TABLES.items():
-        pd.concat(parts[name]).to_csv(HERE / file, index=False)
+def merged(table: pd.DataFrame, rows: pd.DataFrame) -> pd.DataFrame:
+    """Returns a table with the rows of one run; variants stand in the order in which they came, seeds by size."""
+    variant, seed = rows[["variant", "seed"]].iloc[0]
+    kept = table[(table.variant != variant) | (table.seed != seed)]
+    order = list(dict.fromkeys([*table.variant, variant]))
+    ranked = {"variant": order.index, "seed": int}
+    return pd.concat([kept, rows]).sort_values(list(ranked), key=lambda column: column.map(ranked[column.name]))
+
+
+def gather(run: Path) -> None:
+    """Writes a run's rows into the tables beside this file."""
+    looks = pd.read_csv(run / "evaluation.csv")
+    of_run = {"runs": ended(run), "looks": looks[looks.opponent == "all"], "games": own_games(run)}
+    variant, seed = called(run)
+    for name, rows in of_run.items():
+        rows.insert(0, "variant", variant)
+        rows.insert(1, "seed", seed)
+        merged(pd.read_csv(HERE / TABLES[name]), rows).to_csv(HERE / TABLES[name], index=False)
 
 
 def named(variant: str) -> str:
@@ -128,7 +133,6 @@ def shown(*tables: pd.DataFrame) -> str:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        gather([Path(name) for name in sys.argv[1:]])
-    runs, looks, games = (pd.read_csv(HERE / file) for file in TABLES.values())
-    print(shown(runs, looks, games))
+    for name in sys.argv[1:]:
+        gather(Path(name))
+    print(shown(*(pd.read_csv(HERE / file) for file in TABLES.values())))

@@ -1,5 +1,6 @@
 """What docs/results/ says of sweeps, and that its sweeps are of this version's keys."""
 
+import shutil
 import sys
 from types import SimpleNamespace
 
@@ -201,12 +202,16 @@ def test_whole_runs_are_gathered_from_what_they_left(scripts, berteam, monkeypat
     whole_run = tmp_path / "run"
     monkeypatch.setattr(scripts.whole, "HERE", tmp_path)
     monkeypatch.setattr(scripts.whole, "SPAN", 2)
-    scripts.whole.gather([whole_run])
-    runs, looks, games = (pd.read_csv(tmp_path / file) for file in scripts.whole.TABLES.values())
     variant = "experiment=paper_comparison selector=berteam optimizer=coevolution optimizer.replacements=0"
-    for table in (runs, looks, games):
-        assert table.variant.unique().tolist() == [variant]
-        assert table.seed.unique().tolist() == [3]
+    for file in scripts.whole.TABLES.values():
+        shutil.copy(RESULTS / file, tmp_path)
+    scripts.whole.gather(whole_run)
+    tables = [pd.read_csv(tmp_path / file) for file in scripts.whole.TABLES.values()]
+    for table, file in zip(tables, scripts.whole.TABLES.values(), strict=True):
+        others = table[(table.variant != variant) | (table.seed != 3)].reset_index(drop=True)
+        pd.testing.assert_frame_equal(others, pd.read_csv(RESULTS / file), check_exact=True)
+    ours = (table[(table.variant == variant) & (table.seed == 3)] for table in tables)
+    runs, looks, games = (table.reset_index(drop=True) for table in ours)
     played, elo = pd.read_csv(whole_run / "games.csv"), pd.read_csv(whole_run / "elo.csv")
     assert games.to_epoch.tolist() == [2, 4]
     assert games.games.sum() == len(played)
@@ -225,6 +230,18 @@ def test_whole_runs_are_gathered_from_what_they_left(scripts, berteam, monkeypat
         "": "BERTeam, nobody cloned, 3",
         "to 2": f"{choice.elo:.0f} / {shares[0]:.2f} / {shares[1]:.3f}",
     }
+
+
+def test_a_whole_run_takes_the_place_of_its_like_or_joins_its_variant(scripts):
+    table = pd.DataFrame({"variant": ["b", "b", "a"], "seed": [0, 2, 0], "epoch": [1, 2, 3]})
+
+    def with_run(variant: str, seed: int) -> list[tuple]:
+        rows = pd.DataFrame({"variant": variant, "seed": seed, "epoch": [8, 9]})
+        return list(scripts.whole.merged(table, rows).itertuples(index=False, name=None))
+
+    assert with_run("b", 0) == [("b", 0, 8), ("b", 0, 9), ("b", 2, 2), ("a", 0, 3)]
+    assert with_run("b", 1) == [("b", 0, 1), ("b", 1, 8), ("b", 1, 9), ("b", 2, 2), ("a", 0, 3)]
+    assert with_run("A", 5) == [("b", 0, 1), ("b", 2, 2), ("a", 0, 3), ("A", 5, 8), ("A", 5, 9)]
 
 
 def test_own_games_are_counted_span_by_span(scripts, monkeypatch, tmp_path):
