@@ -2,22 +2,30 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
+KERNELS := $(VENV)/kernels
+
+# Where Python may not keep what it has read, every command would read torch anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help setup demo test lint coverage hooks faults bench check docs picture results reference clean
 
 help: ## what can be made
 	@grep -hE '^[a-zA-Z0-9_-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-setup: $(READY) ## a virtual environment with the package and its tests' needs, and the kernels compiled
+setup: $(KERNELS) ## a virtual environment with the package and its tests' needs, and the kernels compiled
 
+# Little of what is installed is ever imported, so Python compiles that when it is, and saves a minute.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; assert (3, 11) <= sys.version_info < (3, 14), "Python 3.11 to 3.13 is needed; name one: make PYTHON=python3.12 ..."'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/pip install --quiet --no-compile --constraint constraints.txt --editable '.[dev]'
+	touch $(READY)
+
+$(KERNELS): $(READY)
 	$(BIN)/berteam train experiment=quickstart epochs=2 evaluation.games=0 out=build/first on_exists=overwrite > build.log
 	rm -r build/first build.log
-	touch $(READY)
+	touch $(KERNELS)
 
 demo: setup ## the main job, small: train, then look at what came of it
 	$(BIN)/berteam train experiment=quickstart selector=mcaa optimizer=mapelites
@@ -25,10 +33,11 @@ demo: setup ## the main job, small: train, then look at what came of it
 # A file's tests in one process, and files in their order: what they share is made once, and the long ones come early.
 BY_FILE := --dist loadfile --no-loadscope-reorder
 
-test: lint ## style, types and all tests
+test: $(READY) ## style, types and all tests
+	$(MAKE) --jobs=2 lint setup
 	$(BIN)/python -m pytest --numprocesses 2 $(BY_FILE)
 
-lint: setup ## style (ruff) and types (mypy)
+lint: $(READY) ## style (ruff) and types (mypy)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy

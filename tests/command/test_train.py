@@ -119,9 +119,9 @@ def test_a_resumed_run_ends_with_the_same_bytes(selector, berteam, tmp_path):
 def test_an_interrupted_run_goes_on(berteam, tmp_path):
     words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "games_per_epoch=4"]
     words += ["record_every=100", "checkpoint_every=10000"]
-    berteam(*words, "epochs=3000", "out=whole")
+    berteam(*words, "epochs=1200", "out=whole")
     process = subprocess.Popen(
-        [BERTEAM, *words, "epochs=3000", "out=cut"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+        [BERTEAM, *words, "epochs=1200", "out=cut"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
     )
     table = tmp_path / "cut" / "games.csv"
     while not (table.exists() and table.stat().st_size > 5000):
