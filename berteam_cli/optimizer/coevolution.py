@@ -107,8 +107,9 @@ class Coevolution(Fixed):
         """Returns the population one epoch older, after at most ``replacements`` members were replaced.
 
         The islands are visited in random order. In each, members are drawn for removal without replacement and as
-        many parents with replacement; a protected member keeps its place (paper, section on coevolution). Places change
-        hands one after the other: a parent whose own place was just taken passes on what it became.
+        many parents with replacement; a protected member keeps its place, and who is drawn as its own parent stays as it
+        is (paper, section on coevolution). Places change hands one after the other: a parent whose own place was just
+        taken passes on what it became.
         """
         population = own(population)
         replaced: list[Replacement] = []
@@ -125,7 +126,7 @@ class Coevolution(Fixed):
             likely = self.fitness.clone_chances(population.fitness[everyone])
             parents = everyone[rng.choice(len(everyone), size=count, p=likely)]
             for place, parent in zip(removed, parents, strict=True):
-                if population.age[place] > self.protect_new:
+                if place != parent and population.age[place] > self.protect_new:
                     second = self.breeding.second(everyone, likely, rng)
                     replaced.append(self.child(population, int(i), int(place), int(parent), second, rng))
         older, _ = super().renew(population, rng)

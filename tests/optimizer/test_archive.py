@@ -72,7 +72,8 @@ def test_the_fittest_of_a_cell_is_never_replaced(fitness, behaviour, seed, most)
         assert len(rivals) > 1
         assert fitness[x.removed] < rivals.max() or (rivals == rivals.max()).sum() > 1
     crowded = 8 - len(set(cells))
-    assert len(replaced) == min(most, crowded)
+    assert len(optimizer.removable(people, places[0])[0]) == crowded
+    assert len(replaced) <= min(most, crowded)  # fewer where somebody is drawn as its own parent
 
 
 def test_who_is_far_behind_the_best_of_its_cell_goes_first():

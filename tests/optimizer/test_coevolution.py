@@ -56,14 +56,23 @@ def test_removal_chances_are_those_of_the_rule():
     optimizer = coevolution(places)
     for seed in range(2000):
         _, replaced = optimizer.renew(population(places, fitness, 9), np.random.default_rng(seed))
-        counts[replaced[0].removed] += 1
+        counts += np.bincount([x.removed for x in replaced], minlength=4)
     odds = np.append(0, np.exp(-fitness[1:]))  # the fittest is the elite
-    np.testing.assert_allclose(counts / 2000, odds / odds.sum(), atol=0.035)
+    others = 1 - np.exp(fitness) / np.exp(fitness).sum()  # the chance that the parent is somebody else
+    np.testing.assert_allclose(counts / 2000, odds / odds.sum() * others, atol=0.035)
+
+
+def test_who_is_drawn_as_its_own_parent_stays_as_it_is():
+    places = islands(1)
+    before = population(places, 0.0, 9)
+    after, replaced = coevolution(places, elites=0).renew(before, np.random.default_rng(0))
+    assert replaced == []
+    np.testing.assert_array_equal(after.age, before.age + 1)
 
 
 def test_a_protected_member_drawn_in_vain_costs_the_epoch_its_replacement():
-    places = islands(2)
-    young_and_unfit = population(places, [50.0, -50], [9, 3])
+    places = islands(3)
+    young_and_unfit = population(places, [0.0, 50, -50], [9, 9, 3])
     assert coevolution(places, elites=0).renew(young_and_unfit, np.random.default_rng(0))[1] == []
     _, replaced = coevolution(places, elites=0, draw_protected=False).renew(young_and_unfit, np.random.default_rng(0))
     assert [x.removed for x in replaced] == [0]
