@@ -26,7 +26,7 @@ from berteam_cli.report.drawing import check_matplotlib
 from berteam_cli.stored import plain_config, write_config
 from berteam_cli.terminal import console, end, say
 
-GAMES_PER_PAIR, BETWEEN, AGAINST = 10, 10_000, 1_000  # of an evaluation and of a comparison, at scale 1
+GAMES_PER_PAIR, BETWEEN, AGAINST = 8, 10_000, 1_000  # of an evaluation and of a comparison, at scale 1
 
 
 @dataclass(frozen=True)

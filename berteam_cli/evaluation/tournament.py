@@ -114,13 +114,19 @@ def schedule(
     """Returns the line-ups of both teams in all games, (B, T) each: ``games_per_pair`` games of a pair in a row.
 
     The members of both teams stand in every order in turn, each for one game in each of so many ``ways`` to hold the
-    sides; where there are more orders than that makes, an order is drawn for each time.
+    sides. What is left of a round of all orders goes to some of them, drawn for each pair: the same ones for all would
+    count for more in every score. Where there are more orders than games, an order is drawn for each time.
     """
     size = teams.shape[1]
     in_turn = -(-games_per_pair // ways)
     if factorial_pairs(size) <= in_turn:
         orders = np.array(list(product(permutations(range(size)), repeat=2)))
-        chosen = np.broadcast_to(orders[np.arange(in_turn) % len(orders)], (len(first), in_turn, 2, size))
+        whole = in_turn - in_turn % len(orders)
+        turns = np.broadcast_to(np.arange(in_turn) % len(orders), (len(first), in_turn))
+        if whole < in_turn:
+            drawn = rng.permuted(np.broadcast_to(np.arange(len(orders)), (len(first), len(orders))), axis=1)
+            turns = np.concatenate([turns[:, :whole], drawn[:, : in_turn - whole]], axis=1)
+        chosen = orders[turns]
     else:
         chosen = rng.permuted(np.broadcast_to(np.arange(size), (len(first), in_turn, 2, size)), axis=3)
     chosen = np.repeat(chosen, ways, axis=1)[:, :games_per_pair]
@@ -130,8 +136,11 @@ def schedule(
 
 
 def plays_every_order(sides: int, teams: Ints, games_per_pair: int) -> bool:
-    """Returns whether so many games a pair have the members of ``teams`` (K, T) in every order, from every side."""
-    return factorial_pairs(teams.shape[1]) <= games_per_pair // len(arrangements(sides))
+    """Returns whether so many games a pair have the members of ``teams`` (K, T) in every order, from every side, alike.
+
+    Then games without chance tell what a pair scores for good: each of those there are is played equally often.
+    """
+    return games_per_pair % (factorial_pairs(teams.shape[1]) * len(arrangements(sides))) == 0
 
 
 def factorial_pairs(size: int) -> float:

@@ -3,7 +3,7 @@ import pytest
 
 from berteam_cli.acting import fixed_policies
 from berteam_cli.env.rps import Rps
-from berteam_cli.evaluation.tournament import schedule, tournament
+from berteam_cli.evaluation.tournament import plays_every_order, schedule, tournament
 from berteam_cli.games import Games
 from berteam_cli.selector.base import unordered_teams
 from berteam_cli.workers import Workers
@@ -42,6 +42,24 @@ def test_orders_of_the_members(games_per_pair, distinct):
         assert len(lineups) == distinct
     for k in range(0, games_per_pair - 1, 2):  # the same order once from either side
         np.testing.assert_array_equal(ours[k], ours[k + 1])
+
+
+def test_what_is_left_of_a_round_of_all_orders_goes_to_other_orders_for_each_pair():
+    teams = np.arange(400).reshape(200, 2)
+    first, second = np.arange(0, 200, 2), np.arange(1, 200, 2)
+    ours, theirs = schedule(teams, first, second, 12, 2, np.random.default_rng(0))
+    crossed = np.stack([np.diff(x, axis=1)[:, 0] < 0 for x in (ours, theirs)], axis=1).reshape(100, 12, 2)
+    assert (crossed[:, :8:2] == [[0, 0], [0, 1], [1, 0], [1, 1]]).all()
+    left = crossed[:, 8::2] @ [2, 1]  # (100, 2)
+    assert (left[:, 0] != left[:, 1]).all()
+    counts = np.bincount(left.ravel(), minlength=4)
+    assert np.abs(counts - 50).max() < 4 * np.sqrt(200 / 4 * 3 / 4)
+
+
+@pytest.mark.parametrize(("games_per_pair", "alike"), [(8, True), (10, False), (4, False), (24, True)])
+def test_every_order_is_played_alike_in_whole_rounds_only(games_per_pair, alike):
+    assert plays_every_order(2, np.array([[0, 1], [2, 3]]), games_per_pair) is alike
+    assert not plays_every_order(2, np.arange(26).reshape(2, 13), games_per_pair)
 
 
 def test_large_teams_stand_in_drawn_orders():
