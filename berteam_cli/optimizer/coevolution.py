@@ -107,9 +107,9 @@ class Coevolution(Fixed):
         """Returns the population one epoch older, after at most ``replacements`` members were replaced.
 
         The islands are visited in random order. In each, members are drawn for removal without replacement and as
-        many parents with replacement; a protected member keeps its place, and who is drawn as its own parent stays as it
-        is (paper, section on coevolution). Places change hands one after the other: a parent whose own place was just
-        taken passes on what it became.
+        many parents with replacement; a protected member keeps its place, and who is drawn as its own parent stays as
+        it is (paper, section on coevolution). Places change hands one after the other: a parent whose own place was
+        just taken passes on what it became.
         """
         population = own(population)
         replaced: list[Replacement] = []
