@@ -38,7 +38,7 @@ class McaaState:
 
     @property
     def shares(self) -> Floats:
-        """(I,) chance that a place is given to each island."""
+        """(I,) chance that a place at which everybody may stand is given to each island."""
         return softmax(self.logits)
 
 
@@ -92,8 +92,9 @@ class Mcaa(Plain):
     ) -> tuple[McaaState, Selecting]:
         """Returns the state after counting the games and, every ``train_every`` epochs, one gradient step.
 
-        The step goes down half the squared distance between the island shares q of the teams that count and the own
-        shares s: logits += eta J (q - s), with J = diag(s) - s s^T the Jacobian of the softmax.
+        The step goes down half the squared distance between the island shares q of the teams that count and those of
+        the teams that it draws, s, the mean over places of s_t: logits += eta J (q - s), where J is the mean of
+        diag(s_t) - s_t s_t^T, the Jacobian of s. Where everybody may stand anywhere, s is the softmax.
         """
         state = replace(self._counted(state, outcomes), epochs=state.epochs + 1)
         teams = len(state.tally) if state.tally is not None else int(state.wins.sum()) // self.field.team_size
@@ -102,9 +103,10 @@ class Mcaa(Plain):
         members = state.wins if state.tally is None else self._of_the_best(state.tally, len(state.logits))
         if not members.any():
             return state, Selecting(buffer=teams, skipped=1)
-        shares = state.shares
-        error = members / members.sum() - shares
-        step = shares * (error - shares @ error)
+        shares = self._shares(state)
+        # q and s are means over places, not one for each: a tally does not keep who stood where.
+        error = members / members.sum() - shares.mean(axis=0)
+        step = (shares * (error - (shares @ error)[:, np.newaxis])).mean(axis=0)
         logits = state.logits + self.learning_rate * step
         learnt = replace(state, logits=logits, wins=np.zeros_like(state.wins), tally=self._nobody())
         return learnt, Selecting(updates=1, loss=float(error @ error / 2))
@@ -145,6 +147,16 @@ class Mcaa(Plain):
         places = self.field.island_of[tally.teams.ravel()]
         # numpy's types forget the weights.
         return np.bincount(places, weights=weights, minlength=islands)  # type: ignore[return-value]
+
+    def _shares(self, state: McaaState) -> Floats:
+        """Returns (T, I) the chance that each place is given to each island, within the rules.
+
+        s_ti ~ exp(logit_i) times the part of island i that may stand at place t. Were winners compared with the softmax
+        alone, the logits would move although nobody wins more often than others.
+        """
+        islands = len(state.logits)
+        places = [np.bincount(self.field.island_of, row, minlength=islands) for row in self._chances(state)]
+        return np.array(places)
 
     def _chances(self, state: McaaState) -> Floats:
         """Returns (T, N) the chance of each member at each place, in proportion to its island's share."""

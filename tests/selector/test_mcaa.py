@@ -13,8 +13,24 @@ FITNESS = np.zeros(6)
 RNG = np.random.default_rng(0)
 
 
-def mcaa(train_every=1, learning_rate=0.2, team_size=2, valid=None):
-    return Mcaa(Field(ISLANDS, team_size, valid=valid), learning_rate, train_every)
+def mcaa(train_every=1, learning_rate=0.2, team_size=2, valid=None, islands=ISLANDS):
+    return Mcaa(Field(islands, team_size, valid=valid), learning_rate, train_every)
+
+
+def rules(rng):
+    """Returns (2, 6) who may stand where, at random, and (2, 3) of each island the part that may."""
+    allowed = rng.random((2, 6)) < 0.5
+    allowed[np.arange(2), rng.integers(6, size=2)] = True
+    return allowed, allowed @ np.eye(3)[ISLANDS] / np.bincount(ISLANDS)
+
+
+def winners(teams):
+    """Returns games that the first of two sides won, ``teams``, (K, T)."""
+    teams = np.asarray(teams)
+    return outcomes(np.stack([teams, teams], axis=1), np.tile([1.0, 0], (len(teams), 1)))
+
+
+DRAW = outcomes([[[0, 0], [2, 2]]], [[0.5, 0.5]])
 
 
 @given(floats(3), st.integers(0, 2**32))
@@ -101,3 +117,56 @@ def test_rules_are_kept_and_shares_hold_among_who_may_stand_there():
     lineups = selector.select(state, 200, np.zeros(6, dtype=int), np.random.default_rng(0))
     assert allowed[np.arange(2), lineups.teams].all()
     np.testing.assert_allclose(np.exp(lineups.log_chances), first[lineups.teams[:, :, 0]] / 2)
+
+
+@given(floats(3), st.integers(0, 2**32))
+def test_within_rules_the_step_is_the_gradient_too(logits, seed):
+    """O7 with s the mean over places of what is drawn there: a softmax over who may stand there."""
+    rng = np.random.default_rng(seed)
+    allowed, parts = rules(rng)
+    selector, state = mcaa(valid=allowed), McaaState(logits, np.zeros(3, dtype=int), 0)
+    teams = selector.sample(state, 5, rng)
+    learnt, said = selector.learn(state, winners(teams), UNSEEN, FITNESS, RNG)
+
+    theta = torch.tensor(logits, requires_grad=True)
+    q = torch.tensor(np.bincount(ISLANDS[teams.ravel()], minlength=3) / 10)
+    s = torch.softmax(theta + torch.log(torch.tensor(parts)), dim=1).mean(dim=0)
+    loss = ((q - s) ** 2).sum() / 2
+    loss.backward()
+    np.testing.assert_allclose(learnt.logits, logits - 0.2 * theta.grad.numpy(), atol=1e-12)
+    assert said.loss == pytest.approx(loss.item(), abs=1e-12)
+
+
+@given(floats(3), st.integers(0, 2**32))
+def test_within_rules_shares_stay_where_winners_are_what_is_drawn(logits, seed):
+    """A coin decides each game: members win as often as they are drawn, and these expected wins move nothing."""
+    allowed, _ = rules(np.random.default_rng(seed))
+    selector, nobody = mcaa(valid=allowed), np.zeros(3)
+    drawn = np.bincount(ISLANDS, selector.captains(McaaState(logits, nobody, 0)))
+    learnt, said = selector.learn(McaaState(logits, 1000 * drawn, 0), DRAW, UNSEEN, FITNESS, RNG)
+    assert said.updates == 1
+    np.testing.assert_allclose(learnt.logits, logits, atol=1e-12)
+
+
+def test_within_rules_shares_stay_by_hand():
+    """28 winners, every team as often as it is drawn: 5 : 5 : 4 for members 0, 1 and 2 beside 3 or 4."""
+    allowed = np.array([[True, True, True, False, False, False], [False, False, False, True, True, False]])
+    selector, logits = mcaa(valid=allowed), np.log([0.5, 0.2, 0.3])
+    games = winners([(a, b) for a, often in enumerate((5, 5, 4)) for b in (3, 4) for _ in range(often)])
+    after, _ = selector.learn(McaaState(logits, np.zeros(3, dtype=int), 0), games, UNSEEN, FITNESS, RNG)
+    np.testing.assert_allclose(after.logits, logits, atol=1e-12)
+    more, _ = selector.learn(McaaState(logits, np.zeros(3, dtype=int), 0), winners([(2, 3)]), UNSEEN, FITNESS, RNG)
+    assert more.logits[1] > logits[1]  # it won more often than it is drawn
+
+
+@given(floats(4), st.integers(0, 2**32))
+def test_an_island_that_may_stand_nowhere_is_as_if_it_were_not_there(logits, seed):
+    """As exploiters are: the others learn what they would without it."""
+    teams = np.random.default_rng(seed).integers(6, size=(5, 2))
+    islands, allowed = np.append(ISLANDS, [3, 3]), np.tile(np.arange(8) < 6, (2, 1))
+    alone, _ = mcaa().learn(McaaState(logits[:3], np.zeros(3, dtype=int), 0), winners(teams), UNSEEN, FITNESS, RNG)
+    beside, _ = mcaa(valid=allowed, islands=islands).learn(
+        McaaState(logits, np.zeros(4, dtype=int), 0), winners(teams), UNSEEN, np.zeros(8), RNG
+    )
+    assert beside.logits[3] == logits[3]
+    np.testing.assert_allclose(beside.logits[:3], alone.logits, atol=1e-12)

@@ -1,5 +1,7 @@
 """MCAA that counts the best of the teams that played, not the winners."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -18,8 +20,8 @@ GAMES = outcomes(
 )  # means: (0, 1) and (2, 5) .75, (2, 2) .5, (3, 4) 0
 
 
-def mcaa(top_fraction, train_every=1):
-    return Mcaa(Field(ISLANDS, 2), 0.2, train_every, top_fraction)
+def mcaa(top_fraction, train_every=1, valid=None):
+    return Mcaa(Field(ISLANDS, 2, valid=valid), 0.2, train_every, top_fraction)
 
 
 def step(shares):
@@ -63,6 +65,17 @@ def test_games_are_counted_over_the_epochs_between_two_updates():
     np.testing.assert_array_equal(restored.tally.teams, once.tally.teams)
     other, _ = selector.learn(restored, again, None, np.zeros(6), RNG)
     np.testing.assert_array_equal(other.logits, twice.logits)
+
+
+def test_within_rules_shares_stay_where_all_teams_are_as_good():
+    """One of island 0 beside one of the others, all eight teams alike: once each is as often as they are drawn."""
+    selector = mcaa(1.0, valid=np.array([[1, 1, 0, 0, 0, 0], [0, 0, 1, 1, 1, 1]], dtype=bool))
+    state = replace(selector.init(RNG), logits=np.log([5.0, 1, 3]))
+    teams = [[a, b] for a in (0, 1) for b in (2, 3, 4, 5)]
+    games = outcomes(np.reshape(teams, (4, 2, 2)), np.full((4, 2), 0.5))
+    after, said = selector.learn(state, games, None, np.zeros(6), RNG)
+    assert said.updates == 1
+    np.testing.assert_allclose(after.logits, state.logits, atol=1e-12)
 
 
 @given(floats(7, 0, 1), st.floats(0.01, 1))
