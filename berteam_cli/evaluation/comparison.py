@@ -48,8 +48,8 @@ class Plan:
         acting: how everybody acts.
         lineups: B games.
         first: (B,) whether the run that is looked at stands on side 0.
-        teams: for each run, how many teams it sampled for the fixed teams; each plays each of them once from either
-            side.
+        teams: for each run, how many teams it sampled for the fixed teams; each plays each of them twice, see
+            ``for_fixed``.
         row: of the games between runs, the run that is looked at.
         column: of these games, its opponent.
     """
@@ -90,12 +90,12 @@ def planned(
     anchors, sizes = len(reference.teams), np.bincount(of)
     ours, theirs, first, teams = [], [], [], []
     for r, run in enumerate(runs):
-        made = sampled(run, even_share(against, int(sizes[of[r]])) // SIDES, 0, rng) + offsets[r]
+        made, on_0 = for_fixed(run, even_share(against, int(sizes[of[r]])) // SIDES, rng)
         teams.append(len(made))
-        ours.append(np.repeat(made, anchors * SIDES, axis=0))
+        ours.append(np.repeat(made + offsets[r], anchors * SIDES, axis=0))
         fixed = np.tile(np.repeat(reference.teams, SIDES, axis=0), (len(made), 1)) + offsets[-1]
         theirs.append(rng.permuted(fixed, axis=1))
-        first.append(np.tile([True, False], len(made) * anchors))
+        first.append(np.repeat(on_0, anchors, axis=0).ravel())
     row, column = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     for i, j in combinations(range(len(runs)), 2):
         if of[i] == of[j]:
@@ -111,6 +111,19 @@ def planned(
     lineups = placed(np.concatenate(ours), np.concatenate(theirs), np.stack([on_left, ~on_left], axis=1))
     acting = joined([*members, fixed_policies(range(policies_there))])
     return Plan(acting, lineups, on_left, teams, np.concatenate(row), np.concatenate(column))
+
+
+def for_fixed(run: Contender, count: int, rng: Generator) -> tuple[Ints, Bools]:
+    """Returns (M, T) teams that ``run`` samples to meet fixed ones, and (M, SIDES) in which games each is on side 0.
+
+    A team plays once from either side; M is ``count``. A selector that tells sides apart makes as many teams for each,
+    M is even, and they stand there in both games: it would field them nowhere else.
+    """
+    if not run.parts.selector.by_side:
+        return sampled(run, count, 0, rng), np.tile([True, False], (count, 1))
+    half = -(-count // SIDES)
+    made = np.concatenate([sampled(run, half, side, rng) for side in range(SIDES)])
+    return made, np.repeat([[True, True], [False, False]], half, axis=0)
 
 
 def counted(plan: Plan, outcomes: Outcomes, anchors: int) -> Played:

@@ -186,6 +186,17 @@ def exploitability(strategy: Floats, payoff: Floats) -> float:
     return max(0.0, float((payoff @ strategy).max()))
 
 
+def estimated_exploitability(strategy: Floats, one: Floats, other: Floats) -> float:
+    """Returns ``exploitability`` from two estimates of the payoff, whose errors have nothing to do with each other.
+
+    Either estimate chooses a best response and the other rates it; the mean of both is returned. A response that was
+    chosen for its luck has none where it is rated, so that the mean over many estimates is at most the truth, but for
+    this: what is below 0, as no truth is, becomes 0. Two equal estimates without errors give the exact value.
+    """
+    gains, others = one @ strategy, other @ strategy
+    return max(0.0, float(gains[others.argmax()] + others[gains.argmax()]) / 2)
+
+
 def nash_conv(row: Floats, column: Floats, payoff: Floats) -> float:
     """Returns what both players of the zero-sum game ``payoff`` together would gain by best responses (Lanctot 2017).
 

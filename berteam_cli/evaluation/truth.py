@@ -26,6 +26,9 @@ from berteam_cli.selector.base import TeamDistribution
 from berteam_cli.training import key
 
 NEGLIGIBLE = 1e-9  # probability that rounding leaves
+# Probability that 100,000 draws may not find two teams of, and with which teams of Elos 1,000 points apart move a mean
+# by one point at most.
+SMALL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,9 @@ class Truth:
         """Returns the Elo of a team that the selector chooses, and its 95 % half width.
 
         Sum of P(team) Elo(team) over all unordered teams. The mean of the drawn teams stands for those that are not
-        listed; how they scatter is in the width, by Student's t. NaN where too few teams were rated to know.
+        listed; how they scatter is in the width, by Student's t. Where fewer than two were drawn, the listed ones stand
+        for a rest below SMALL, and what it could change within the range of the Elos is in the width; what a larger
+        rest leaves unknown is NaN.
         """
         chosen = self.chosen
         rest = 1.0 - chosen.listed_mass
@@ -85,6 +90,10 @@ class Truth:
         variance = 0.0
         if rest > NEGLIGIBLE:
             drawn = int(chosen.draws.sum())
+            if drawn < 2 and rest < SMALL:
+                weights /= chosen.listed_mass
+                width = quantile * np.sqrt(((weights * errors) ** 2).sum()) + rest * np.ptp(self.elos)
+                return float(weights @ self.elos), float(width)
             if drawn == 0:
                 return math.nan, math.nan
             weights += rest * chosen.draws / drawn

@@ -146,7 +146,8 @@ def test_exploitability_is_the_same_whatever_the_workers_and_where_a_run_was_cut
     berteam("resume", "cut", "epochs=6")
     column = exploited(tmp_path / "whole")
     assert (column.notna() == (column.index % 2 == 0)).all()
-    assert column.dropna().between(1e-9, 1).all()
+    assert column.dropna().between(0, 1).all()
+    assert column.max() > 1e-9
     assert (tmp_path / "whole" / "selector.csv").read_bytes() == (tmp_path / "cut" / "selector.csv").read_bytes()
 
 
@@ -169,7 +170,7 @@ def test_figures_are_those_of_the_tables(berteam, tmp_path):
     last = pd.read_csv(tmp_path / "run" / "team_distribution.csv", dtype={"team": str}).query("epoch == 6")
     assert len(elo) == 21
     np.testing.assert_allclose(elo.set_index("team").probability[last.team], last.probability, atol=1e-12)
-    assert (elo.games == 6 * 10).all()
+    assert (elo.games == 6 * 8).all()
     assert (elo.games == elo.wins + elo.draws + elo.losses).all()
     assert elo.elo.between(elo.elo_low, elo.elo_high).all()
     assert (elo.rank_low < elo.rank_high).all()
@@ -300,6 +301,16 @@ def test_exploitability_of_equal_chances(berteam, tmp_path):
     berteam("train", *HANDS, "selector=uniform", "epochs=2", "out=run")
     # A pair of different hands beats two of the three pairs of equal ones and loses to the third; each has 1/9.
     assert exploited(tmp_path / "run")[2] == pytest.approx(1 / 9)
+
+
+def test_luck_does_not_make_equal_teams_exploitable(berteam, tmp_path):
+    """Networks that have not learnt show any hand alike, so that no team has an edge."""
+    words = [*LEARNERS, "selector=uniform", "learner.learning_rate=1e-9", "learner.n_steps=1024", "epochs=24"]
+    berteam("train", *words, "record_every=1", "out=run")
+    measured = exploited(tmp_path / "run")
+    assert measured.notna().all()
+    assert measured.mean() < 0.09  # .13 where the same games choose the best answer and rate it
+    assert (measured == 0).any()
 
 
 def test_errors_are_one_sentence(berteam, tmp_path):

@@ -1,16 +1,23 @@
 """Games between runs, counted and rated."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from berteam_cli import build
 from berteam_cli.acting import fixed_policies
-from berteam_cli.evaluation.comparison import Plan, Played, compared, counted, even_share
+from berteam_cli.config import checked
+from berteam_cli.evaluation.comparison import Plan, Played, compared, counted, even_share, planned
+from berteam_cli.evaluation.contenders import Contender
 from berteam_cli.evaluation.reference import Reference
 from berteam_cli.games import placed
 from berteam_cli.outcomes import Outcomes
 from berteam_cli.rating.bradley_terry import held_ratings
+from berteam_cli.selector.base import Plain
+from berteam_cli.training import begin
+from tests.test_config import composed
 
 ANCHORS = Reference(np.array([[0], [1]]), np.array([900.0, 1100.0]), "by hand")
 
@@ -48,6 +55,36 @@ def test_swapping_the_colours_of_all_games_changes_nothing():
 
 def test_both_sides_get_the_same_number_of_games_and_nobody_too_few():
     assert [even_share(games, parts) for games, parts in ((10, 1), (10, 3), (1, 4), (7, 2))] == [10, 4, 2, 4]
+
+
+class Sided(Plain):
+    """Shows paper as blue, 1, and scissors as red, 2."""
+
+    by_side = True
+
+    def sample(self, state, count, rng, side):
+        return np.full((count, 1), 1 + side)
+
+
+def test_who_tells_sides_apart_fields_a_team_on_its_side_only():
+    parts = build.parts(checked(composed("env=rps", "team_size=1", "population=hands", "selector=uniform")))
+    run = begin(parts)
+    any_hand = Contender(Path("any"), 0, parts, run, {}, "")
+    sided = replace(any_hand, parts=replace(parts, selector=Sided()))
+    hands = Reference(np.arange(3)[:, np.newaxis], np.full(3, 1000.0), "by hand")
+    plan = planned([sided, any_hand], np.array([0, 1]), hands, 3, 40, 9, np.random.default_rng(0))
+    assert plan.teams == [6, 5]  # five teams are asked for, and as many for either side
+    ours = plan.lineups.teams[:, :, 0]
+    mine, others = slice(0, 6 * 3 * 2), slice(6 * 3 * 2, (6 + 5) * 3 * 2)
+    assert plan.first[mine].sum() == 18
+    np.testing.assert_array_equal(np.where(plan.first, ours[:, 0], ours[:, 1])[mine], np.where(plan.first, 1, 2)[mine])
+    np.testing.assert_array_equal(plan.first[others], np.tile([True, False], 15))
+    between = plan.first[others.stop :]  # where the run that is looked at is the same
+    np.testing.assert_array_equal(np.where(between, *ours[others.stop :].T), np.where(between, 1, 2))
+    outcomes, _ = parts.games.play(plan.acting, plan.lineups, 0)
+    found = counted(plan, outcomes, 3).fixed[0]
+    paper, scissors = [[2, 0, 0], [0, 2, 0], [0, 0, 2]], [[0, 0, 2], [2, 0, 0], [0, 2, 0]]
+    np.testing.assert_array_equal(found, [paper] * 3 + [scissors] * 3)
 
 
 def played(strong, weak, teams=40):

@@ -4,6 +4,7 @@ import pytest
 from berteam_cli.evaluation.equilibria import (
     HIGHEST_ENTROPY,
     ONLY,
+    estimated_exploitability,
     exploitability,
     fixed_point,
     nash,
@@ -134,6 +135,45 @@ def test_exploitability_by_hand():
 def test_exploitability_is_half_of_nash_conv_where_both_players_do_the_same(seed):
     payoff, mix = antisymmetric(6, seed), np.random.default_rng(seed).dirichlet(np.ones(6))
     assert nash_conv(mix, mix, payoff) == pytest.approx(2 * exploitability(mix, payoff))
+
+
+def test_estimated_exploitability_by_hand():
+    one = np.array([[0.0, 0.4, 0.6], [-0.4, 0.0, 0.0], [-0.6, 0.0, 0.0]])
+    other = np.array([[0.0, -0.2, -0.8], [0.2, 0.0, 0.0], [0.8, 0.0, 0.0]])
+    mix = np.array([0.5, 0.5, 0.0])  # gains .2, -.2, -.3 by the one, -.1, .1, .4 by the other
+    assert estimated_exploitability(mix, one, one) == exploitability(mix, one) == 0.2
+    assert estimated_exploitability(mix, other, other) == exploitability(mix, other) == 0.4
+    assert estimated_exploitability(mix, one, other) == 0  # it would be (-.3 - .1) / 2
+    assert estimated_exploitability(np.array([0.2, 0.8, 0.0]), one, one - 0.1) == pytest.approx(0.32 - 0.05)
+
+
+def measured(chances):
+    """Means over 500 measurements by eight games a pair without draws, one half of them each and both together."""
+    rng, size = np.random.default_rng(0), len(chances)
+    mixes = np.full(size, 1 / size), np.eye(size)[0]
+    halved, whole = [], []
+    for _ in range(500):
+        games = np.triu(np.where(rng.random((2, 4, size, size)) < chances, 1.0, -1.0), 1)
+        one, other = (games - games.transpose(0, 1, 3, 2)).mean(axis=1)
+        halved.append([estimated_exploitability(mix, one, other) for mix in mixes])
+        whole.append([exploitability(mix, (one + other) / 2) for mix in mixes])
+    return np.mean(halved, axis=0), np.mean(whole, axis=0)
+
+
+def test_luck_does_not_make_equal_teams_exploitable():
+    """Equal chances of all and all mass on one: what is left is the estimates below 0 that are told as 0."""
+    halved, whole = measured(np.full((21, 21), 0.5))
+    np.testing.assert_allclose(whole, [0.14, 0.63], atol=0.02)
+    np.testing.assert_allclose(halved, [0.03, 0.15], atol=0.02)
+
+
+def test_a_best_response_is_not_rated_above_what_it_gets():
+    chances = np.full((21, 21), 0.5)
+    chances[7], chances[:, 7] = 0.75, 0.25  # it gets a half of everybody else
+    halved, whole = measured(chances)
+    assert halved[0] == pytest.approx(0.5 * 20 / 21, abs=0.01)  # far above all others, so that it is always found
+    # Against one team alone 19 others are as likely to look better by luck: too low, where it was too high.
+    np.testing.assert_allclose([halved[1], whole[1]], [0.23, 0.71], atol=0.03)
 
 
 def test_nash_conv_is_0_at_the_equilibrium_of_both_players():

@@ -6,7 +6,7 @@ import pytest
 from berteam_cli.acting import fixed_policies, joined, noisy
 from berteam_cli.env.rps import Rps
 from berteam_cli.evaluation import playing
-from berteam_cli.evaluation.payoffs import payoff_steps, payoffs
+from berteam_cli.evaluation.payoffs import halved_payoffs, pair_scores, payoff_steps, payoffs
 from berteam_cli.evaluation.tournament import tournament
 from berteam_cli.games import Games, pairings
 from berteam_cli.selector.base import unordered_teams
@@ -70,6 +70,37 @@ def test_it_agrees_with_a_tournament():
     np.testing.assert_array_equal(played.wins[other], won[other])
     np.testing.assert_array_equal(played.draws[other], drawn[other])
     assert (won > 0).any()
+
+
+def test_each_half_of_the_games_has_both_sides_and_either_order_of_either_team():
+    games, acting, teams = mctf(), noisy(fixed_policies([0, 2, 5]), 0.4), np.array([[0, 1], [1, 2], [0, 2]])
+    halves = halved_payoffs(games, acting, teams, 8, np.random.default_rng(3))
+    whole = payoffs(games, acting, teams, 8, np.random.default_rng(3))
+    np.testing.assert_allclose((halves[0].wins + halves[1].wins) / 2, whole.wins, atol=1e-12)
+    np.testing.assert_allclose((halves[0].draws + halves[1].draws) / 2, whole.draws, atol=1e-12)
+    assert (halves[0].wins != halves[1].wins).any()
+    # Games of a pair: members 0-1 against 1-2, 0-1 against 2-1, 1-0 against 1-2, 1-0 against 2-1, each as blue and red.
+    scores = pair_scores(games, acting, teams, 8, np.random.default_rng(3))[1]
+    for half, mine in zip(halves, ([0, 1, 6, 7], [2, 3, 4, 5]), strict=True):
+        assert half.wins[0, 1] == (scores[mine] == 1).mean()
+        assert half.draws[0, 1] == (scores[mine] == 0.5).mean()
+
+
+def test_halves_of_pairs_without_chance_are_the_whole():
+    games, teams = mctf(), unordered_teams(3, 2)
+    sure, chancy = fixed_policies([0, 2, 5]), joined([fixed_policies([0, 2]), noisy(fixed_policies([5]), 0.4)])
+    whole = payoffs(games, sure, teams, 8, np.random.default_rng(0))
+    for half in halved_payoffs(games, sure, teams, 8, np.random.default_rng(0)):
+        np.testing.assert_array_equal(half.wins, whole.wins)
+        np.testing.assert_array_equal(half.draws, whole.draws)
+    known = np.ix_(*[~(teams == 2).any(axis=1)] * 2)
+    one, other = halved_payoffs(games, chancy, teams, 8, np.random.default_rng(0))
+    np.testing.assert_array_equal(one.wins[known], whole.wins[known])
+    np.testing.assert_array_equal(other.wins[known], whole.wins[known])
+    assert (one.wins != other.wins).any()
+    # Of teams of three not all orders are played, so that neither half knows.
+    three = halved_payoffs(rps(3), fixed_policies(range(3)), unordered_teams(3, 3), 8, np.random.default_rng(0))
+    assert three[0].wins.shape == (10, 10)
 
 
 def test_neither_the_workers_nor_the_batches_change_the_chances_of_fixed_policies(monkeypatch):

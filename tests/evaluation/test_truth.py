@@ -93,6 +93,32 @@ def test_too_few_draws_tell_no_interval():
     assert np.isnan(rated([0.5], [1300]).expected_elo()).all()
 
 
+@pytest.mark.parametrize("draws", [0, 1])
+def test_a_rest_that_is_never_drawn_costs_no_more_than_it_could_change(draws):
+    # 1,200 and 1,000 are of the listed teams; a millionth of the mass is of others, here of one of 800.
+    found = rated([0.6, 0.4 - 1e-6, 1e-6], [1200, 1000, 800], [True, True, False], [0, 0, draws])
+    expected, width = found.expected_elo()
+    assert expected == pytest.approx((0.6 * 1200 + (0.4 - 1e-6) * 1000) / (1 - 1e-6), abs=1e-9)
+    scatter = 10 * np.sqrt(0.6**2 + (0.4 - 1e-6) ** 2) / (1 - 1e-6)
+    assert width == pytest.approx(scatter + 1e-6 * 400, abs=1e-9)
+    assert abs(expected - (0.6 * 1200 + (0.4 - 1e-6) * 1000 + 1e-6 * 800)) < width
+    much = rated([0.6, 0.4 - 2e-3, 2e-3], [1200, 1000, 800], [True, True, False], [0, 0, draws])
+    assert np.isnan(much.expected_elo()[1])
+
+
+def test_the_elo_of_all_but_a_millionth_of_the_mass_is_told():
+    chances = np.full(210, 1e-6 / 208)
+    chances[[17, 99]] = 0.6, 0.4 - 1e-6
+    found = distribution(chances, members=20)
+    chosen = choose_teams(found, drawn_by(found), 56, 56 * 40)
+    assert chosen.listed.sum() == 20
+    assert chosen.draws.sum() < 2
+    assert chosen.listed_mass < 1 - 1e-7
+    elos = np.where(chosen.probability > 0.5, 1300.0, np.where(chosen.probability > 0.1, 900.0, 1000.0))
+    known = Truth(chosen, elos, np.full(len(chosen), 30.0), independent(*np.zeros((3, len(chosen), 1), dtype=int)))
+    assert known.expected_elo() == pytest.approx((1140, 30 * np.sqrt(0.6**2 + 0.4**2)), abs=1e-3)
+
+
 def test_the_interval_of_the_expected_elo_covers_it():
     """Of 300 evaluations of a few of 78 teams, about 95 % have the truth within their interval."""
     rng = np.random.default_rng(5)
@@ -170,7 +196,7 @@ def test_games_played_again_make_nothing_surer():
     assert (many.half_widths > few.half_widths * 0.8).all()
     # Only opponents that know chance let an Elo differ from one evaluation to the next.
     alone = Reference(known.teams[certain], known.elos[certain], "without chance")
-    repeated = truth(games, fixed_policies(range(7)), chosen, alone, 9, np.random.default_rng(1))
+    repeated = truth(games, fixed_policies(range(7)), chosen, alone, 16, np.random.default_rng(1))
     np.testing.assert_array_equal(replay_variance(repeated, alone), 0)
     assert (replay_variance(many, known) > 0).all()
 
