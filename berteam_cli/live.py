@@ -84,7 +84,8 @@ class View:
         if self.recorded is None:
             return UNKNOWN, UNKNOWN
         epoch, distribution = self.recorded
-        effective = f"{math.exp(distribution.entropy):,.1f} (epoch {epoch})"
+        entropy = distribution.entropy
+        effective = UNKNOWN if math.isnan(entropy) else f"{math.exp(entropy):,.1f} (epoch {epoch})"
         if not len(distribution.teams):
             return effective, UNKNOWN
         likeliest = int(np.argmax(distribution.probability))

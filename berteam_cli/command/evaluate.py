@@ -31,7 +31,7 @@ from berteam_cli.holding import held
 from berteam_cli.population import names, policies
 from berteam_cli.reading import how_far, last_state
 from berteam_cli.records import COLUMNS, EVALUATION, SHEETS, team_name, team_names, write_table
-from berteam_cli.selector.base import TeamDistribution, measured, team_count
+from berteam_cli.selector.base import TeamDistribution, measured
 from berteam_cli.selector.embeddings import Embedding
 from berteam_cli.selector.independent import with_all_teams
 from berteam_cli.stored import write_config
@@ -145,7 +145,7 @@ class Look:
                 f"so there is no regression and no calibration."
             )
             return found
-        few = team_count(field.members, field.team_size) <= self.config.teams_at_most
+        few = field.teams <= self.config.teams_at_most
         return with_all_teams(found, field) if few else found
 
     def strength(self, match: Match, learned: TeamDistribution, rng: Generator) -> tuple[Strength, dict[str, Any]]:
@@ -153,7 +153,7 @@ class Look:
         selector, most = self.parts.selector, self.config.teams_at_most
         choosing, playing = rng.spawn(2)
         chosen = choose_teams(learned, lambda count: selector.sample(self.run.selection, count, choosing), 1, most)
-        teams = team_count(selector.field.members, selector.field.team_size)
+        teams = selector.field.teams
         if len(chosen) < teams:
             say(f"{len(chosen):,} of {teams:,} possible teams are rated (teams_at_most={most:,}).")
         title = f"Rating {len(chosen):,} teams"

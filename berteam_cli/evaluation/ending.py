@@ -22,7 +22,6 @@ from berteam_cli.rating.bootstrap import interval, rank_intervals
 from berteam_cli.rating.counts import independent
 from berteam_cli.recording import Recorder
 from berteam_cli.records import COLUMNS, team_name, write_table
-from berteam_cli.selector.base import team_count
 from berteam_cli.training import EVALUATION, Run, generator
 
 log = logging.getLogger("berteam")
@@ -61,15 +60,14 @@ def conclude(
     budget = run.played if settings.games is None else settings.games
     rng = generator(parts.seed, EVALUATION, run.epoch)
     chosen = choose_teams(distribution, lambda count: parts.selector.sample(run.selection, count, rng), each, budget)
-    teams = team_count(field.members, field.team_size)
     log.info(
         "Rating %d of %s teams, %d games each, as evaluation.games=%s allows.",
-        *(len(chosen), f"{teams:,}", each, f"{budget:,}"),
+        *(len(chosen), f"{field.teams:,}", each, f"{budget:,}"),
     )
     rated, source = rate(settings, chosen, run, recorder, rng)
     manifest.add(
         evaluation={
-            "teams": teams,
+            "teams": field.teams,
             "rated": len(chosen),
             "most_probable": int(chosen.listed.sum()),
             "random_sample": int((~chosen.listed).sum()),

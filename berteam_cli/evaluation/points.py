@@ -14,7 +14,7 @@ from berteam_cli.evaluation.payoffs import Payoffs, payoffs
 from berteam_cli.outcomes import Floats
 from berteam_cli.population import names, policies
 from berteam_cli.records import team_name
-from berteam_cli.selector.base import TeamDistribution, team_count
+from berteam_cli.selector.base import TeamDistribution
 from berteam_cli.selector.independent import anybody, distribution, with_all_teams
 from berteam_cli.training import Parts, Run
 
@@ -49,11 +49,10 @@ class Points:
 def why_not(parts: Parts, learned: TeamDistribution, most: int) -> str:
     """Returns why the teams of a run do not play each other, nothing if they do."""
     field = parts.selector.field
-    teams = team_count(field.members, field.team_size)
     if field.sides != 2:
         return f"Games of {field.sides} sides have no payoff matrix"
-    if teams > most:
-        return f"{teams:,} possible teams are more than most={most:,}"
+    if field.teams > most:
+        return f"{field.teams:,} possible teams are more than most={most:,}"
     if learned.samples:
         return "The teams are too many for an exact distribution (selector.exact_limit)"
     return ""

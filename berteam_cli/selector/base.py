@@ -14,6 +14,8 @@ from berteam_cli.outcomes import Bools, Experience, Floats, Ints, Lineups, Outco
 
 S = TypeVar("S")
 
+ROUNDING = 1e-9  # that chances of all teams may fall short of 1
+
 
 @dataclass(frozen=True)
 class Field:
@@ -37,6 +39,11 @@ class Field:
     def members(self) -> int:
         """N, the size of the population."""
         return len(self.island_of)
+
+    @property
+    def teams(self) -> int:
+        """How many unordered teams there are of members who may stand at some place; at most, where places differ."""
+        return team_count(int(self.allowed.any(axis=0).sum()), self.team_size)
 
     @property
     def allowed(self) -> Bools:
@@ -70,9 +77,13 @@ class TeamDistribution:
 
     @property
     def entropy(self) -> float:
-        """Entropy over the listed teams, in nats; ``other`` counts as one team."""
-        chances = np.append(self.probability, self.other)
-        chances = chances[chances > 0]
+        """Entropy over all teams, in nats; NaN where they are not all listed, each with its exact chance.
+
+        Shares of drawn teams do not tell it: of many teams most are drawn once or never.
+        """
+        if self.samples or self.other > ROUNDING:
+            return math.nan
+        chances = self.probability[self.probability > 0]
         return float(-(chances * np.log(chances)).sum()) + 0.0  # a sure team has 0, not -0
 
 

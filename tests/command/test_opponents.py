@@ -52,6 +52,8 @@ def test_a_resumed_run_ends_with_the_same_bytes(whole, berteam, tmp_path):
 
 
 def test_the_tables_of_a_league(whole, berteam, tmp_path):
+    facts = json.loads((whole / "manifest.json").read_text())
+    assert facts["evaluation"]["teams"] == 45  # of the nine members who are no exploiters
     games, met = pd.read_csv(whole / "games.csv"), pd.read_csv(whole / "opponents.csv", dtype={"opponent": str})
     outsiders = {6, 7, 8}
     assert (games.groupby("epoch").size() == 6).all()

@@ -189,6 +189,7 @@ def test_sampled_distribution_says_so(berteam, tmp_path):
     np.testing.assert_allclose(table.groupby("epoch").probability.sum(), 1)
     assert len(table[table.epoch == 1]) == 5
     assert "estimated from 20000" in json.loads((tmp_path / "run" / "manifest.json").read_text())["team_distribution"]
+    assert read(tmp_path / "run", "selector")[["effective_teams", "entropy"]].isna().all(axis=None)
 
 
 def test_flags_of_hydra(berteam, tmp_path):

@@ -58,6 +58,15 @@ def test_expected_elo_is_the_sum_over_all_teams():
     assert judged(KNOWING, 0)["effective_teams"][0] == pytest.approx(1)
 
 
+def test_effective_teams_are_not_told_of_a_sampled_distribution():
+    found, rng = measured(UNIFORM, 0), np.random.default_rng(0)
+    again = Replayed(0, 1, np.array([1000.0, 1100]), np.zeros((1000, 2)))
+    seen = TeamDistribution(TEAMS[:10], UNIFORM[:10], 1 - UNIFORM[:10].sum(), 1000, np.zeros(10))
+    rows = {name: value for name, value, *_ in figures(found, seen, again, rng)}
+    assert np.isnan(rows["effective_teams"])
+    assert rows["expected_elo"] == judged(UNIFORM, 0)["expected_elo"][0]
+
+
 def test_regret_of_a_selector_that_knows_and_of_one_that_does_not():
     """Over many evaluations: none, and the gap between the best and the mean, whatever luck the best Elo had."""
     found = [(judged(KNOWING, seed, 5.0), judged(UNIFORM, seed, 5.0)) for seed in range(60)]

@@ -23,7 +23,7 @@ from berteam_cli.live import View
 from berteam_cli.pace import Pace
 from berteam_cli.population import Island
 from berteam_cli.rating.bradley_terry import held_ratings
-from berteam_cli.selector.base import unordered_teams
+from berteam_cli.selector.base import TeamDistribution, unordered_teams
 from berteam_cli.training import begin
 from berteam_cli.workers import Workers
 from tests.test_config import composed
@@ -180,6 +180,15 @@ def test_who_has_no_fixed_policies_cannot_be_looked_at():
     build.check_watched(10, Rps(team_size=2))
     with pytest.raises(InputError, match=r"^evaluate_every must be 0 with env=rps, .* but is 10\.$"):
         build.check_watched(10, alone)
+
+
+def test_effective_teams_are_shown_where_all_teams_are_listed(parts):
+    view, teams, chances = View(parts, 40, Pace(0, 40), begin(parts)), np.array([[0, 1], [2, 2]]), np.array([0.5, 0.5])
+    view.tell(begin(parts), 0, TeamDistribution(teams, chances))
+    assert view.figures()["effective teams"] == "2.0 (epoch 0)"
+    view.tell(begin(parts), 0, TeamDistribution(teams, chances / 2, 0.5, 1000, chances))
+    assert view.figures()["effective teams"] == "-"
+    assert view.figures()["favourite team"] == "0-1 (0.250)"
 
 
 @pytest.mark.parametrize("columns", [40, 140])

@@ -60,6 +60,18 @@ def test_too_many_teams_are_sampled():
     np.testing.assert_allclose(sampled.probability, [known[tuple(t)] for t in sampled.teams], atol=0.01)
 
 
+def test_entropy_is_told_only_where_all_teams_are_listed():
+    """Most of 37,820 teams are in no sample of 20,000, and their entropy is in none either."""
+    rng = np.random.default_rng(0)
+    everybody = uniform(members=60, team_size=3)
+    assert math.isnan(measured(everybody, None, rng).entropy)
+    assert math.isnan(everybody.likeliest(None, 5, rng).entropy)
+    few = uniform(members=4)
+    assert math.isnan(few.likeliest(None, 5, rng).entropy)
+    whole = few.likeliest(None, 10, rng)
+    assert whole.entropy == pytest.approx(few.distribution(None).entropy)
+
+
 def test_rules_are_kept_and_chances_are_those_of_who_is_drawn():
     allowed = np.array([[True, True, False], [False, True, True]])
     selector = uniform(members=3, valid=allowed)
