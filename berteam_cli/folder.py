@@ -136,8 +136,9 @@ class Manifest:
 
     @classmethod
     def resumed(cls, folder: Path, **facts: Any) -> Manifest:
-        """Returns the manifest of a run that goes on now; what was known of it is kept."""
+        """Returns the manifest of a run that goes on now; what was known of it is kept, but how it failed."""
         manifest = cls.of(folder)
+        manifest.facts.pop("error", None)
         again = {"command": command_line(), "started": now()}
         resumed = [*manifest.facts.get("resumed", []), again]
         manifest.add(status="running", ended=None, resumed=resumed, **circumstances(), **facts)

@@ -83,10 +83,8 @@ def figures_of(
     seconds, games = report.seconds, len(report.outcomes.lineups) + len(report.met.teams)
     figures = {f"timing/{name}": value for name, value in seconds.items()}
     if seconds.get("play_s"):
-        figures |= {
-            "play/games_per_s": games / seconds["play_s"],
-            "play/steps_per_s": report.env_steps / seconds["play_s"],
-        }
+        steps = int(report.outcomes.steps.sum() + report.met.outcomes.steps.sum())  # without those of probing games
+        figures |= {"play/games_per_s": games / seconds["play_s"], "play/steps_per_s": steps / seconds["play_s"]}
     selecting = report.selecting
     figures |= {
         "selector/loss": selecting.loss,

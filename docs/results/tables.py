@@ -2,7 +2,8 @@
 
 A row for each variant, which is all jobs that differ in their seed only: means over the seeds and their 95 % intervals
 by Student's t; of one job alone its figures. Results are of the selector's choice against the fixed teams. The best
-team's Elo is that of fresh games, and stands only where `berteam evaluate` was run on every job.
+team's Elo is that of fresh games, by `berteam evaluate` of the last epoch. Where not all seeds have a figure, it is
+told how many do.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def of_job(folder: Path) -> dict[str, float]:
     end = choice.loc[last]
     return {
         "expected Elo": end.elo if math.isnan(summary.expected_elo) else summary.expected_elo,
-        "best team": replayed(folder),
+        "best team": replayed(folder, last),
         "best member": totals.loc[("best_member", last), "elo"],
         "highest expected on the way": choice.elo.max(),
         "won": end.wins / end.games,
@@ -62,22 +63,30 @@ def of_job(folder: Path) -> dict[str, float]:
     }
 
 
-def replayed(folder: Path) -> float:
-    """Returns the Elo of the best rated team from games that did not choose it; NaN without an evaluation."""
+def replayed(folder: Path, epoch: int) -> float:
+    """Returns the Elo of the best rated team from games that did not choose it; NaN if not after ``epoch``."""
     path = folder / "evaluation" / "figures.csv"
     if not path.exists():
         return math.nan
-    return float(pd.read_csv(path).set_index("quantity").value["best_elo_replayed"])
+    figure = pd.read_csv(path).set_index("quantity").loc["best_elo_replayed"]
+    return float(figure.value) if figure.epoch == epoch else math.nan
 
 
 def variant_jobs(folder: Path) -> dict[str, list[Path]]:
-    """Returns for each variant, named by what it says that most jobs do not, the folders of its jobs that are done."""
+    """Returns for each variant the folders of its jobs that are done.
+
+    A variant is named by what it says that most jobs do not; by all that it says where another has that name.
+    """
     sweep = Sweep.read(folder)
     said = Counter(word for words in sweep.jobs.values() for word in words)
+    names: dict[tuple[str, ...], str] = {}
     found: dict[str, list[Path]] = {}
     for job, words in sweep.jobs.items():
-        own = [x for x in words if said[x] <= len(sweep.jobs) / 2 and not x.startswith("seed=")]
-        of_variant = found.setdefault(" ".join(own) or AS_IT_IS, [])
+        variant = tuple(x for x in words if not x.startswith("seed="))
+        if variant not in names:
+            name = " ".join(x for x in variant if said[x] <= len(sweep.jobs) / 2) or AS_IT_IS
+            names[variant] = (" ".join(variant) or "nothing said") if name in found else name
+        of_variant = found.setdefault(names[variant], [])
         if sweep.status(job)[0] == "done":
             of_variant.append(folder / str(job))
     return found
@@ -94,6 +103,8 @@ def of_sweep(folder: Path) -> pd.DataFrame:
     rows = []
     for variant, figures in variants(folder).items():
         said = [spoken(figures[x].to_numpy(), 2 if x in SHARES else 0) for x in figures]
+        have = figures.notna().sum()
+        said = [f"{x} ({n} of {len(figures)})" if 0 < n < len(figures) else x for x, n in zip(said, have, strict=True)]
         rows.append([f"`{variant}`", str(len(figures)), *said])
     return pd.DataFrame(rows, columns=list(HEAD))
 

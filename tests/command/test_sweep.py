@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from berteam_cli.folder import Manifest
-from berteam_cli.sweep.folder import Sweep, working
+from berteam_cli.sweep.folder import Sweep, make_table, working
 from berteam_cli.sweep.job import cores_each
 from berteam_cli.sweep.plan import NEEDS, spelt
 from berteam_cli.workers import available_cores
@@ -106,6 +106,19 @@ def test_a_job_that_ends_is_not_seen_half_ended(tmp_path):
     assert ("failed", "the disk is full") in seen
     assert ("failed", "") not in seen
     assert {status for status, _ in seen} <= {"waiting", "running", "failed"}  # never as if it had been killed
+
+
+def test_a_job_that_went_on_alone_no_longer_tells_how_it_failed(tmp_path):
+    Sweep(tmp_path, "train", {0: ["seed=0"]}).keep()
+    (tmp_path / "0").mkdir()
+    Manifest.begun(tmp_path / "0").add(status="failed", error="the disk is full")
+    make_table(tmp_path)
+    assert list(table(tmp_path).error) == ["the disk is full"]
+    with Manifest.resumed(tmp_path / "0").until_the_end():
+        pass
+    make_table(tmp_path)
+    assert list(table(tmp_path).status) == ["done"]
+    assert table(tmp_path).error.isna().all()
 
 
 def test_killed_in_the_middle_and_resumed(berteam, tmp_path):

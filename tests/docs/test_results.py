@@ -48,6 +48,32 @@ def test_a_variant_is_named_by_what_most_jobs_do_not_say(scripts, tmp_path):
     assert scripts.tables.of_sweep(tmp_path)["seeds"].to_list() == ["0", "0", "0"]
 
 
+def test_variants_that_would_share_a_name_stay_apart(scripts, tmp_path):
+    lists = [["x=0"], ["x=1"], ["x=1", "y=1"], ["x=1", "z=1"]]
+    Sweep(tmp_path, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
+    assert list(scripts.tables.variants(tmp_path)) == ["x=0", "as it is", "y=1", "z=1"]
+    lists = [["x=1"], [], ["x=1", "y=1"]]
+    Sweep(tmp_path, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
+    assert list(scripts.tables.variants(tmp_path)) == ["as it is", "nothing said", "y=1"]
+
+
+def test_it_is_told_how_many_seeds_have_a_figure(scripts, monkeypatch):
+    figures = pd.DataFrame({name: [1.0, 3.0] for name in scripts.tables.HEAD[2:]})
+    figures["best team"], figures["first capture"] = [np.nan, 1200.0], np.nan
+    monkeypatch.setattr(scripts.tables, "variants", lambda folder: {"x=1": figures})
+    (row,) = scripts.tables.of_sweep(None).to_dict("records")
+    assert (row["best team"], row["first capture"]) == ("1200 (1 of 2)", "")
+    assert row["expected Elo"] == "2 ± 13"
+
+
+def test_a_best_team_is_that_of_an_evaluation_after_the_last_epoch(scripts, tmp_path):
+    (tmp_path / "evaluation").mkdir()
+    figures = {"epoch": [5, 5], "quantity": ["regret", "best_elo_replayed"], "value": [20.0, 1100.5]}
+    pd.DataFrame(figures).to_csv(tmp_path / "evaluation" / "figures.csv", index=False)
+    assert scripts.tables.replayed(tmp_path, 5) == 1100.5
+    assert np.isnan(scripts.tables.replayed(tmp_path, 6))
+
+
 def test_selectors_are_compared_population_by_population(scripts):
     elos = pd.DataFrame({"berteam": [1010.0, 1110.0], "uniform": [1000.0, 1100.0]}, index=["a", "b"])
     elos.index.name = "population"
@@ -296,6 +322,13 @@ def test_a_course_is_the_mean_of_the_looks_since_the_point_before(scripts):
     assert points.games.tolist() == [105.0, 1000.0]
     assert points.elo.tolist() == [910.0, 1000.0]
     assert points.won.tolist() == pytest.approx([0.2, 0.5])
+
+
+def test_the_strengths_beside_the_courses_are_those_of_the_scripted_teams(scripts):
+    elos = pd.read_csv(ROOT / "berteam_cli" / "rating" / "mctf_2_607c6363.csv").elo
+    assert round(elos.max()) == scripts.course.BEST_PAIR
+    drawn = scripts.course.NO_WIN_NO_LOSS
+    assert (1 / (1 + 10 ** ((elos - drawn) / 400))).mean() == pytest.approx(0.5, abs=0.001)
 
 
 def test_all_courses_are_drawn(scripts, tmp_path):

@@ -7,7 +7,7 @@ import pytest
 
 from berteam_cli.logger.base import Once
 from berteam_cli.logger.tensorboard import FOLDER, events
-from tests.command.conftest import berteam  # noqa: F401 (a fixture)
+from tests.command.conftest import TINY, berteam  # noqa: F401 (a fixture)
 
 SMALL = ["env=rps", "population=ppo6", "selector=mcaa", "checkpoint_every=2", "record_every=2", "epochs=4"]
 NEVER_THE_SAME = {"timing.csv", "summary.csv"}
@@ -46,6 +46,16 @@ def test_the_figures_are_the_tables(run):
     assert figures["fitness/main_best"][4] == pytest.approx(last.max(), rel=1e-6)
     expected = pd.read_csv(run / "summary.csv").expected_elo[0]
     assert figures["elo/expected"] == {4: pytest.approx(expected, rel=1e-6)}
+
+
+def test_speeds_are_those_of_the_training_s_own_games(berteam, tmp_path):  # noqa: F811
+    words = ["optimizer=mapelites", "selector=mcaa", "population=ppo6", *TINY, "evaluation.games=0"]
+    berteam("train", *words, "optimizer.protect_new=0", "logger=tensorboard", "out=run")
+    games, timing = (pd.read_csv(tmp_path / "run" / f"{name}.csv") for name in ("games", "timing"))
+    own = games.groupby("epoch").steps.sum()
+    assert (timing.set_index("epoch").env_steps > own).any()  # there are probing games, too
+    for epoch, value in shown(tmp_path / "run")["play/steps_per_s"].items():
+        assert value == pytest.approx(own[epoch] / timing.play_s[epoch - 1], rel=1e-6)
 
 
 def test_the_tables_stay_as_they_are(run, berteam, tmp_path):  # noqa: F811
