@@ -100,13 +100,13 @@ def timing(source: Source) -> Plot:
         plot.stackplot(x, y.T, labels=labels, colors=SERIES[: len(parts)])
         plot.set_xlim(x[0], x[-1])
         over_epochs(plot)
+        figure.legend(loc="outside lower left", ncols=3)
     else:
         plot.bar(list(parts.values()), y[0], color=SERIES[0])
         plot.tick_params(axis="x", rotation=30)
     plot.set_ylabel("seconds an epoch")
     highest = float(y[len(y) > 2 :].sum(axis=1).max())
     plot.set_ylim(0, 1.1 * highest if highest > 0 else None)
-    figure.legend(loc="outside lower left", ncols=3)
     total = table[list(parts)].sum(axis=1)
     says = (
         f"{total.sum():,.0f} s in all, {total.median():.3g} s in the median epoch; the first, in which kernels are "
