@@ -26,8 +26,8 @@ from berteam_cli.stored import stored_config
 from berteam_cli.terminal import end, say
 from berteam_cli.trust import trusted
 from berteam_cli.workers import Workers
-from mctf.film import Film, filmed
-from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIED
+from mctf.film import Film, filmed, result
+from mctf.kernel import RUNNING
 from mctf.page import write_page
 from mctf.render import clock, write_gif
 from mctf.rules import BLUE, RED
@@ -184,7 +184,8 @@ def strongest(folder: Path, blue: str | None, red: str | None) -> tuple[str, str
     rated = [] if table is None else list(table.sort_values("rank", kind="stable").team)
 
     def best_but(opponent: str | None, key: str) -> str:
-        free = [name for name in rated if name != opponent]
+        other = None if opponent is None else sorted(opponent.split("-"))  # whose members may be named in any order
+        free = [name for name in rated if sorted(name.split("-")) != other]
         if not free:
             raise InputError(
                 f"{folder} has rated too few teams to choose one (with evaluation.games=0 none); name both, such as "
@@ -304,6 +305,4 @@ def checked_film(game: Mctf, outcomes: Outcomes, experience: Experience, i: int 
 def ending(film: Film) -> str:
     """Returns how a game ended, in words."""
     blue, red = (int(film.score[-1, side, CAPTURES]) for side in (BLUE, RED))
-    result = "It is a draw" if blue == red else f"{'Blue' if blue > red else 'Red'} wins"
-    result = {BLUE_WON: "Blue wins", RED_WON: "Red wins", TIED: "It is a draw"}.get(film.end, result)
-    return f"{result}, {blue} to {red}, after {clock(film.time[-1])} ({len(film.time) - 1} steps)."
+    return f"{result(film)}, {blue} to {red}, after {clock(film.time[-1])} ({len(film.time) - 1} steps)."

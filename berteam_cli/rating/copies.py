@@ -10,12 +10,12 @@ from berteam_cli.env.mctf import Mctf
 from berteam_cli.outcomes import Bools, Ints
 from mctf.rules import STARTS_RANDOM
 
-RANDOM = ("random", "combined")  # how the names of fixed policies begin that draw their actions
+RANDOM = ("random", "combined_medium")  # the fixed policies that draw their actions
 
 
 def draws_actions(env: Env, policies: Policies) -> Bools:
     """Returns (K,) which policies draw their actions: two games of others alone can be the same game."""
-    random = np.array([name.startswith(RANDOM) for name in env.fixed_policies])
+    random = np.array([name in RANDOM for name in env.fixed_policies])
     fixed = policies.kind == FIXED
     by_name = np.zeros(len(fixed), dtype=np.bool_)
     by_name[fixed] = random[policies.fixed[fixed]]

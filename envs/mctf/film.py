@@ -8,13 +8,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from mctf import geometry
 from mctf.commands import FIELD_POINTS, MISSING
-from mctf.kernel import RUNNING, finished, step
+from mctf.kernel import BLUE_WON, RED_WON, RUNNING, TIED, finished, step
 from mctf.observe import observation_size, observe
 from mctf.rules import ACTIONS, Rules
 from mctf.scripted import NAMES, act
 from mctf.start import reset
 from mctf.state import (
     CAPTURED,
+    CAPTURES,
     GRABBED,
     HIT_WALL,
     LOST_BY_TAG,
@@ -168,6 +169,14 @@ def film_of_policies(policies: Sequence[int], rules: Rules, seed: int = 0) -> Fi
         actions.append([act(policy, state, 0, v, seen[v], rules) for v, policy in enumerate(policies)])
         step(state, 0, np.array(actions[-1]), rules)
     return filmed(actions, rules, seed)
+
+
+def result(film: Film) -> str:
+    """Returns what became of a game that is over, in words; on time more captures win."""
+    gap = int(np.subtract(*film.score[-1, :, CAPTURES]))
+    on_time = "It is a draw" if gap == 0 else f"{'Blue' if gap > 0 else 'Red'} wins"
+    # Both may have all the captures there are to make, and the rules then say whose the game is.
+    return {BLUE_WON: "Blue wins", RED_WON: "Red wins", TIED: "It is a draw"}.get(film.end, on_time)
 
 
 def _checked(actions: ArrayLike, rules: Rules) -> NDArray[np.int64]:

@@ -56,14 +56,12 @@ function show(frame) {
   byId("clock").textContent = clock(at * film.step);
   byId("scrub").value = at;
   byId("scrub").setAttribute("aria-valuetext", clock(at * film.step));
-  const points = team => score[6 * now + 3 * team];
   TEAMS.forEach((name, team) => {
     const [captures, tags, grabs] = score.slice(6 * now + 3 * team, 6 * now + 3 * team + 3);
     byId(name).querySelector(".captures").textContent = captures;
     byId(name).querySelector("p").textContent = `grabs ${grabs} · tags ${tags}`;
   });
-  const result = points(0) === points(1) ? "It is a draw" : `${points(0) > points(1) ? "Blue" : "Red"} wins`;
-  byId("result").textContent = now === last && film.over ? result : `of ${clock(film.limit)}`;
+  byId("result").textContent = now === last && film.result ? film.result : `of ${clock(film.limit)}`;
   chips.forEach((chip, v) => {
     const is = status[now * V + v];
     chip.textContent = is & IS_TAGGED ? "✕ tagged" : is & CARRIES ? "⚑ flag" : "";

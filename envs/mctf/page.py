@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mctf.film import TEAM_NAMES, Film, home, is_right, said, team_of
+from mctf.film import TEAM_NAMES, Film, home, is_right, result, said, team_of
 from mctf.kernel import RUNNING
 from mctf.rules import BLUE, RED
 
@@ -66,7 +66,7 @@ def _told(film: Film, names: Sequence[str], title: str) -> dict[str, Any]:
         "step": rules.substeps * rules.tau_s,
         "limit": rules.max_time_s,
         "frames": len(film.pos),
-        "over": film.end != RUNNING,
+        "result": "" if film.end == RUNNING else result(film),
         "pos": _steps(film.pos * 100.0),  # cm
         "heading": _steps(film.heading),  # deg
         "status": _steps(status),

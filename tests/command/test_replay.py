@@ -187,6 +187,7 @@ def test_default_teams(tmp_path):
     assert strongest(tmp_path, None, None) == ("2-5", "0-2")
     assert strongest(tmp_path, "0-2", None) == ("0-2", "2-5")
     assert strongest(tmp_path, None, "2-5") == ("0-2", "2-5")
+    assert strongest(tmp_path, "5-2", None) == ("5-2", "0-2")  # the same team, not against itself
     assert strongest(tmp_path, "9-9", "8-8") == ("9-9", "8-8")
     with pytest.raises(InputError, match="rated too few teams"):
         strongest(tmp_path / "empty", None, "1-1")

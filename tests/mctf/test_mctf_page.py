@@ -6,7 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from mctf.film import filmed, said
+from mctf.film import filmed, result, said
+from mctf.kernel import RED_WON, RUNNING, TIED, TIME_OUT
 from mctf.page import write_page
 from mctf.render import clock
 from mctf.rules import make_rules
@@ -38,6 +39,16 @@ def test_it_needs_nothing_else(page):
     assert "default-src 'none'" in content
     assert not re.search(r"/\*(STYLE|SCRIPT|FILM)\*/", content)
     assert page.stat().st_size < 100_000
+
+
+@pytest.mark.parametrize(
+    ("end", "said"), [(RED_WON, "Red wins"), (TIED, "It is a draw"), (TIME_OUT, "It is a draw"), (RUNNING, "")]
+)
+def test_who_won_is_what_the_rules_say(film, tmp_path, end, said):
+    level = film._replace(score=np.zeros_like(film.score), end=end)  # as many captures on either side
+    write_page(level, tmp_path / "game.html", [""] * len(DUEL), "")
+    assert told(tmp_path / "game.html")["result"] == said
+    assert end == RUNNING or result(level) == said
 
 
 def test_the_numbers_are_the_films(page, film):

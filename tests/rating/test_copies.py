@@ -6,7 +6,7 @@ import pytest
 from berteam_cli.acting import GREEDY, fixed_policies, joined
 from berteam_cli.env.rps import Rps
 from berteam_cli.games import pairings
-from berteam_cli.rating.copies import chancy_teams, clusters
+from berteam_cli.rating.copies import chancy_teams, clusters, draws_actions
 from tests.makers import mctf, random_networks
 
 
@@ -25,7 +25,7 @@ def test_the_same_players_on_the_same_places_play_the_same_game():
 def test_who_draws_actions_never_plays_the_same_game_twice():
     games, acting = mctf(), fixed_policies(range(7))
     named = games.env.fixed_policies
-    random = [k for k, name in enumerate(named) if name.startswith(("random", "combined"))]
+    random = [k for k, name in enumerate(named) if name in ("random", "combined_medium")]
     sure = [k for k in range(7) if k not in random]
     assert random
     lineups = pairings(np.array([[random[0], sure[0]]] * 3), np.array([[sure[1], sure[2]]] * 3))
@@ -34,6 +34,21 @@ def test_who_draws_actions_never_plays_the_same_game_twice():
     np.testing.assert_array_equal(chancy_teams(games.env, acting, teams), [True, False, True])
     outcomes, _ = games.play(acting, pairings(np.full((40, 2), random[0]), np.full((40, 2), sure[0])), 1)
     assert len(np.unique(outcomes.events.reshape(40, -1), axis=0)) > 1
+
+
+@pytest.mark.parametrize("profile", ["pyquaticus-2024-06", "pyquaticus-2025-11"])
+def test_the_fixed_policies_that_draw_are_those_whose_games_differ(profile):
+    games = mctf(profile=profile)
+    names = games.env.fixed_policies
+    acting = fixed_policies(range(len(names)))
+    members = np.repeat(np.arange(len(names)), 12)
+    differ = np.zeros(len(names), dtype=bool)
+    for opponent in ("attack_easy", "attack_hard"):
+        others = np.full((len(members), 2), names.index(opponent))
+        outcomes, _ = games.play(acting, pairings(np.stack([members, members], axis=1), others), 1)
+        kinds = [len(np.unique(x.reshape(12, -1), axis=0)) for x in outcomes.events.reshape(len(names), 12, -1)]
+        differ |= np.array(kinds) > 1
+    np.testing.assert_array_equal(differ, draws_actions(games.env, acting))
 
 
 @pytest.mark.parametrize("starts", ["quarter", "random"])
