@@ -253,7 +253,9 @@ def check_links(folder: Path) -> None:
         InputError: something does.
     """
     home = folder.resolve()
-    inside = (path for name in INSIDE for path in (folder / name).rglob("*"))
+    # Not by rglob, which fails where a run that goes on has just moved a folder, as it does with each checkpoint.
+    walks = (found for name in INSIDE for found in os.walk(folder / name))
+    inside = (Path(place, name) for place, folders, files in walks for name in (*folders, *files))
     for path in (*folder.iterdir(), *inside):
         try:
             kept = not path.is_symlink() or path.resolve().is_relative_to(home)

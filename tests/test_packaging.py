@@ -29,7 +29,8 @@ def test_the_wheel_holds_what_it_should(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     code = ("berteam_cli/**/*.py", "hydra_plugins/**/*.py")
     kept = ("conf/**/*.yaml", *code, "berteam_cli/**/*.csv", "berteam_cli/**/page.*")
-    for path in (path for pattern in kept for path in ROOT.glob(pattern)):
+    sources = (path for pattern in kept for path in ROOT.glob(pattern) if path.parent.name != "__pycache__")
+    for path in sources:
         inside = path.relative_to(ROOT).as_posix()
         inside = inside if inside.startswith(("berteam_cli", "hydra_plugins")) else f"berteam_cli/{inside}"
         assert inside in names

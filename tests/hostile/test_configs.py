@@ -2,10 +2,12 @@
 
 import json
 import shutil
+import threading
 from pathlib import Path
 
 import pytest
 
+from berteam_cli.folder import check_links
 from tests.hostile.conftest import MARK, READERS, RUNS, changed, refused
 
 YAMLS = (
@@ -111,3 +113,24 @@ def test_a_run_may_be_reached_by_a_link(run, berteam):
     berteam("resume", "latest", "epochs=2")
     Path("run", "loop").symlink_to("loop")
     assert "loop is a link out of the run's folder" in refused(berteam("inspect", "latest", code=2))
+
+
+def test_folders_that_come_and_go_are_no_links(tmp_path):
+    """As those of a checkpoint do, beneath whoever reads the folder of a run that goes on."""
+    part, ended = tmp_path / "checkpoint" / "part", threading.Event()
+    part.parent.mkdir()
+
+    def write():
+        while not ended.is_set():
+            (part / "deep").mkdir(parents=True)
+            part.rename(part.with_name("kept"))
+            shutil.rmtree(part.with_name("kept"))
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(1000):
+            check_links(tmp_path)
+    finally:
+        ended.set()
+        writer.join()
