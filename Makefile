@@ -14,7 +14,7 @@ help: ## what can be made
 
 setup: $(KERNELS) ## a virtual environment with the package and its tests' needs, and the kernels compiled
 
-# Little of what is installed is ever imported, so Python compiles that when it is, and saves a minute.
+# Python compiles what is imported, when it is; pip would compile all that is installed, which takes a minute more.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; assert (3, 11) <= sys.version_info < (3, 14), "Python 3.11 to 3.13 is needed; name one: make PYTHON=python3.12 ..."'
 	$(PYTHON) -m venv $(VENV)
@@ -33,7 +33,7 @@ demo: setup ## the main job, small: train, then look at what came of it
 # A file's tests in one process, and files in their order: what they share is made once, and the long ones come early.
 BY_FILE := --dist loadfile --no-loadscope-reorder
 
-test: $(READY) ## style, types and all tests
+test: ## style, types and all tests
 	$(MAKE) --jobs=2 lint setup
 	$(BIN)/python -m pytest --numprocesses 2 $(BY_FILE)
 

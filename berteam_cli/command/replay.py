@@ -184,7 +184,7 @@ def strongest(folder: Path, blue: str | None, red: str | None) -> tuple[str, str
     rated = [] if table is None else list(table.sort_values("rank", kind="stable").team)
 
     def best_but(opponent: str | None, key: str) -> str:
-        other = None if opponent is None else sorted(opponent.split("-"))  # whose members may be named in any order
+        other = sorted((opponent or "").split("-"))  # whose members may be named in any order
         free = [name for name in rated if sorted(name.split("-")) != other]
         if not free:
             raise InputError(

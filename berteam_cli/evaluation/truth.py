@@ -22,10 +22,9 @@ from berteam_cli.rating.bradley_terry import PRIOR_DRAWS, Z_95, expected, held_r
 from berteam_cli.rating.copies import chancy_teams, clusters
 from berteam_cli.rating.counts import POINTS, Counts, counts
 from berteam_cli.rating.elo import POINTS_PER_NAT, nats, points
-from berteam_cli.selector.base import TeamDistribution
+from berteam_cli.selector.base import NEGLIGIBLE, TeamDistribution
 from berteam_cli.training import key
 
-NEGLIGIBLE = 1e-9  # probability that rounding leaves
 # Probability that 100,000 draws may not find two teams of, and with which teams of Elos 1,000 points apart move a mean
 # by one point at most.
 SMALL = 1e-3

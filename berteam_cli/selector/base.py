@@ -14,7 +14,7 @@ from berteam_cli.outcomes import Bools, Experience, Floats, Ints, Lineups, Outco
 
 S = TypeVar("S")
 
-ROUNDING = 1e-9  # that chances of all teams may fall short of 1
+NEGLIGIBLE = 1e-9  # probability that rounding leaves
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class TeamDistribution:
 
         Shares of drawn teams do not tell it: of many teams most are drawn once or never.
         """
-        if self.samples or self.other > ROUNDING:
+        if self.samples or self.other > NEGLIGIBLE:
             return math.nan
         chances = self.probability[self.probability > 0]
         return float(-(chances * np.log(chances)).sum()) + 0.0  # a sure team has 0, not -0

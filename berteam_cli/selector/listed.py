@@ -18,7 +18,6 @@ from berteam_cli.selector.base import (
     exactly,
     log_orderings,
     most_probable,
-    team_count,
     unordered_teams,
 )
 
@@ -192,8 +191,7 @@ def every_team(field: Field, limit: int) -> Ints | None:
     size, allowed = field.team_size, field.allowed
     if field.alike:
         eligible = np.flatnonzero(allowed[0])
-        count = team_count(len(eligible), size)
-        return eligible[unordered_teams(len(eligible), size)] if count <= limit else None
+        return eligible[unordered_teams(len(eligible), size)] if field.teams <= limit else None
     if math.prod(int(x) for x in allowed.sum(axis=1)) > ORDERS_EACH * limit:
         return None
     standing = np.stack(np.meshgrid(*(np.flatnonzero(row) for row in allowed), indexing="ij"), axis=-1)

@@ -41,19 +41,24 @@ def test_an_interval_is_student_s(scripts):
     assert scripts.tables.spoken(np.array([np.nan])) == ""
 
 
+def swept(folder, lists):
+    """Makes the folder of a sweep that says each of ``lists`` with two seeds."""
+    Sweep(folder, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
+
+
 def test_a_variant_is_named_by_what_most_jobs_do_not_say(scripts, tmp_path):
     lists = [["epochs=9"], ["epochs=9", "x=1"], ["epochs=4"]]
-    Sweep(tmp_path, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
+    swept(tmp_path, lists)
     assert list(scripts.tables.variants(tmp_path)) == ["as it is", "x=1", "epochs=4"]
     assert scripts.tables.of_sweep(tmp_path)["seeds"].to_list() == ["0", "0", "0"]
 
 
 def test_variants_that_would_share_a_name_stay_apart(scripts, tmp_path):
     lists = [["x=0"], ["x=1"], ["x=1", "y=1"], ["x=1", "z=1"]]
-    Sweep(tmp_path, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
+    swept(tmp_path, lists)
     assert list(scripts.tables.variants(tmp_path)) == ["x=0", "as it is", "y=1", "z=1"]
     lists = [["x=1"], [], ["x=1", "y=1"]]
-    Sweep(tmp_path, "train", dict(enumerate([*words, f"seed={k}"] for words in lists for k in range(2)))).keep()
+    swept(tmp_path, lists)
     assert list(scripts.tables.variants(tmp_path)) == ["as it is", "nothing said", "y=1"]
 
 
