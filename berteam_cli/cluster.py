@@ -13,10 +13,12 @@ import pickle
 import signal
 import sys
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache, lru_cache
 from importlib.metadata import version
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy.typing as npt
@@ -31,6 +33,7 @@ log = logging.getLogger("berteam")
 
 GAMES_A_TASK = 64  # at most: some tenths of a second, which is what the death of a worker may lose
 TASKS_A_PROCESSOR = 4  # at least, where there are so many games: enough that processors end together
+AHEAD = 16  # tasks a processor that are asked for at once: some seconds' work, which is done in vain if one fails
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",  # nothing is sent anywhere
     "RAY_NUM_REDIS_GET_RETRIES": "1",  # of 40 s each, to find a cluster; Ray takes 20
@@ -113,31 +116,30 @@ class Cluster:
     def play(self, env: Env, players: Ints, policies: Policies, seeds: npt.NDArray[Any], results: Results) -> None:
         """Plays all games, and fills ``results``; see ``Env.play``.
 
-        A task whose worker or machine dies is given to another.
+        A task whose worker or machine dies is given to another. When one fails, those asked for by then are left to
+        end by themselves: to cancel a task of Ray's that is just ending may end the process that cancels it.
 
         Raises:
             RunError: a game cannot be played, or workers died too often.
         """
         import ray  # noqa: PLC0415 (an extra)
 
-        each = slice_size(len(seeds), self.processors())
+        processors = self.processors()
+        each = slice_size(len(seeds), processors)
         record = len(results.actions) > 0
         call = Call(os.getcwd(), pickle.dumps(env), players, policies, seeds, record, versions())
         packed = ray.put(pickle.dumps(call))
         task = ray.remote(num_cpus=1, max_retries=LIVES)(play_slice)
         starts = range(0, len(seeds), each)
-        pending = [task.remote(packed, start, min(start + each, len(seeds))) for start in starts]
-        try:
-            for k, start in enumerate(starts):
-                processor, played = self.waited(pending[k])
-                self.look(processor)
-                columns: tuple[Any, ...] = results
-                for column, part in zip(columns, played, strict=True):
-                    column[start : start + len(part)] = part
-        except BaseException:  # Ctrl-C among others
-            for reference in pending:
-                ray.cancel(reference)
-            raise
+        asked = (task.remote(packed, start, min(start + each, len(seeds))) for start in starts)
+        pending = deque(islice(asked, AHEAD * processors))
+        for start in starts:
+            processor, played = self.waited(pending.popleft())
+            pending.extend(islice(asked, 1))
+            self.look(processor)
+            columns: tuple[Any, ...] = results
+            for column, part in zip(columns, played, strict=True):
+                column[start : start + len(part)] = part
 
     def waited(self, reference: Any) -> Any:
         """Returns what a task gave.
