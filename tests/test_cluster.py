@@ -8,12 +8,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from logging.handlers import MemoryHandler
 from pathlib import Path
 
 import pytest
+from llvmlite.binding import get_host_cpu_name
 
 from berteam_cli import cluster
-from berteam_cli.cluster import Call, play_slice, slice_size
+from berteam_cli.cluster import Call, Cluster, play_slice, slice_size
 from berteam_cli.errors import RunError
 from tests.command.conftest import BERTEAM, berteam, process  # noqa: F401 (fixtures)
 from tests.env import games_for_tests
@@ -76,29 +78,29 @@ def same_tables(one, other, timed=TIMED):
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
-def test_a_training_has_the_same_bytes_as_on_this_machine(machines, process, tmp_path):  # noqa: F811
-    process("train", *MCTF, "workers=1", "out=here")
+def test_a_training_has_the_same_bytes_as_on_this_machine(machines, berteam, process, tmp_path):  # noqa: F811
+    berteam("train", *MCTF, "workers=1", "out=here")
     said = process("train", *MCTF, "workers=ray", "out=there", "epochs=1").stdout
     assert "Games are played by Ray on 2 machine(s) with 2 processor(s)." in said
     process("resume", "there", "epochs=2")
     same_tables(tmp_path / "here", tmp_path / "there")
 
 
-def test_an_evaluation_has_the_same_bytes_as_on_this_machine(machines, process, tmp_path):  # noqa: F811
-    process("train", "env=rps", "population=ppo6", "selector=mcaa", "epochs=2", "evaluation.games=0", "out=run")
-    for workers in ("1", "ray"):
-        process("evaluate", "run", "games_per_pair=2", "payoff_games=2", f"workers={workers}")
+def test_an_evaluation_has_the_same_bytes_as_on_this_machine(machines, berteam, process, tmp_path):  # noqa: F811
+    berteam("train", "env=rps", "population=ppo6", "selector=mcaa", "epochs=2", "evaluation.games=0", "out=run")
+    for run, workers in ((berteam, "1"), (process, "ray")):
+        run("evaluate", "run", "games_per_pair=2", "payoff_games=2", f"workers={workers}")
         shutil.copytree(tmp_path / "run" / "evaluation", tmp_path / workers)
     same_tables(tmp_path / "1", tmp_path / "ray", set())
 
 
-def test_a_reward_of_the_users_own_travels_and_so_does_its_failure(machines, process, tmp_path):  # noqa: F811
+def test_a_reward_of_the_users_own_travels_and_so_does_its_failure(machines, berteam, process, tmp_path):  # noqa: F811
     (tmp_path / "paid.py").write_text(OWN)
     said = {}
-    for workers in ("1", "ray"):
-        process("train", *MCTF, "epochs=1", "env.reward=paid:pay", f"workers={workers}", f"out=w{workers}")
+    for run, workers in ((berteam, "1"), (process, "ray")):
+        run("train", *MCTF, "epochs=1", "env.reward=paid:pay", f"workers={workers}", f"out=w{workers}")
         words = ["env.reward=paid:broken", f"workers={workers}", "out=broken", "on_exists=overwrite"]
-        said[workers] = process("train", *MCTF, *words, code=3).stderr
+        said[workers] = run("train", *MCTF, *words, code=3).stderr
     same_tables(tmp_path / "w1", tmp_path / "wray")
     assert "env.reward must give finite numbers, but failed or did not in game " in said["1"]
     assert said["1"] == said["ray"]
@@ -110,13 +112,14 @@ def test_an_environment_of_the_users_own_travels(machines, tmp_path):
 
 
 def test_workers_and_machines_that_die_change_nothing(machines, tmp_path):
-    """A machine joins and loses two workers while they play, and then goes itself."""
-    told, said = tmp_path / "told", tmp_path / "said.txt"
-    with said.open("w") as out, driving("plays_until", told, stdout=out) as driver:
+    """A machine joins, loses two workers while they play, and then goes itself."""
+    start, stop, said = tmp_path / "start", tmp_path / "stop", tmp_path / "said.txt"
+    with said.open("w") as out, driving("plays_between", start, stop, stdout=out) as driver:
         try:
-            until(lambda: "The same 1 times." in said.read_text(), said.read_text)
+            until(lambda: "Connected." in said.read_text(), said.read_text)  # to a machine that stays
             mortal, killed = Machine(tmp_path / "mortal.txt", machines), set()
             try:
+                start.touch()
                 while len(killed) < 2:
                     until(lambda: set(mortal.playing()) - killed, said.read_text)
                     for player in set(mortal.playing()) - killed:
@@ -125,16 +128,22 @@ def test_workers_and_machines_that_die_change_nothing(machines, tmp_path):
                 until(lambda: set(mortal.playing()) - killed, said.read_text)
             finally:
                 mortal.cut()
-            before = len(said.read_text().splitlines())
-            until(lambda: len(said.read_text().splitlines()) >= before + 2, said.read_text)
-            told.touch()
+            before = said.read_text().count("The same.")
+            until(lambda: said.read_text().count("The same.") >= before + 2, said.read_text)
+            stop.touch()
             assert driver.wait(PATIENCE_S) == 0, said.read_text()
         finally:
             driver.kill()
 
 
-def test_another_kind_of_processor_is_told_once(machines):
-    drive("meets_another_kind_of_processor")
+def test_another_kind_of_processor_is_told_once(monkeypatch):
+    kept = MemoryHandler(100)
+    monkeypatch.setattr(cluster.log, "handlers", [kept])
+    monkeypatch.setattr(cluster, "connect", lambda: None)
+    there = Cluster()
+    for processor in ("z80", "z80", get_host_cpu_name()):
+        there.look(processor)
+    assert ["has a z80 processor" in record.getMessage() for record in kept.buffer] == [True]
 
 
 def test_a_machine_with_other_versions_is_refused():
