@@ -37,6 +37,7 @@ def plays_an_environment_of_the_users_own():
 
 def plays_between(start, stop):
     """Plays the same games over and over, from when there is a file ``start`` until there is a file ``stop``."""
+    cluster.AHEAD = 1  # so that most games are asked for while others are played
     games = mctf()
     acting = random_networks(12, games.env, hidden=64)
     lineups = pairings(*np.random.default_rng(0).integers(12, size=(2, 100, 2)))

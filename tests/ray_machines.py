@@ -42,8 +42,12 @@ class Machine:
             self.process = subprocess.Popen(
                 [*START, *words], stdout=out, stderr=subprocess.STDOUT, start_new_session=True
             )
-        until(lambda: "Ray runtime started." in said.read_text() or self.process.poll() is not None, said.read_text)
-        assert self.process.poll() is None, said.read_text()
+        try:
+            until(lambda: "Ray runtime started." in said.read_text() or self.process.poll() is not None, said.read_text)
+            assert self.process.poll() is None, said.read_text()
+        except BaseException:
+            self.cut()
+            raise
 
     def playing(self):
         """Returns the processes that play here."""
