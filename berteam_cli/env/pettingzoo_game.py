@@ -18,6 +18,7 @@ from berteam_cli.env.pettingzoo_made import Facts, Game, Unfit
 from mctf.draws import next_uniform
 
 REWARD, INFO = "reward", "info:"  # what decides a game: the rewards, or an entry of the infos
+ROUNDING = 1e-6  # of all that was paid: fractions that differ by less are alike, as float32 keeps seven digits
 
 
 @dataclass
@@ -212,16 +213,21 @@ def vector(player: Player, observation: Any) -> npt.NDArray[np.float32]:
 def gap_of(players: list[Player], score: str) -> float:
     """Returns what blue has more than red: of the rewards of the game, or of an entry of the agents' last infos.
 
+    What rounding may leave of equal fractions is 0; whole numbers are exact.
+
     Raises:
         Unfit: an agent has no such number.
     """
-    totals = []
+    parts: list[list[float]] = []
     for team in (players[: len(players) // 2], players[len(players) // 2 :]):
         if score == REWARD:
-            totals.append(fsum(reward for player in team for reward in player.rewards))  # equal whatever the order
+            parts.append([reward for player in team for reward in player.rewards])
         else:
-            totals.append(fsum(told(player, score.removeprefix(INFO)) for player in team))
-    return totals[0] - totals[1]
+            parts.append([told(player, score.removeprefix(INFO)) for player in team])
+    blue, red = parts
+    gap = fsum(blue) - fsum(red)  # equal whatever the order
+    whole = all(float(part).is_integer() for part in blue + red)
+    return gap if whole or abs(gap) > ROUNDING * fsum(map(abs, blue + red)) else 0.0
 
 
 def told(player: Player, key: str) -> float:

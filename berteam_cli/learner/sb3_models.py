@@ -161,6 +161,8 @@ def check_value(name: str, value: Any, hint: Any) -> None:
     if not (low < value if positive else low <= value) or not value <= high or not math.isfinite(value):
         above, below = f"{'>' if positive else '>='} {low}", " and <= 1" if high == 1.0 else ""
         raise ValueError(f"options.{name} must be {above}{below}, but is {value}.")
+    if name == "gradient_steps" and value == 0:
+        raise ValueError("options.gradient_steps must be >= 1, or -1 for as many as transitions, but is 0.")
 
 
 def check_rollout(settings: Mapping[str, Any]) -> None:

@@ -45,7 +45,8 @@ class Archive:
         if self.bins is None:
             found[known] = KDTree(self.shares(self.centres)).query(shares)[1]
         else:
-            places = np.clip(np.floor(shares * self.bins), 0, self.bins - 1).astype(np.int64)
+            places = np.floor(np.round(shares * self.bins, 9))  # .29 * 100 is 28.999999999999996
+            places = np.clip(places, 0, self.bins - 1).astype(np.int64)
             found[known] = np.ravel_multi_index(tuple(places.T), tuple(self.bins))
         return found
 

@@ -241,6 +241,22 @@ def test_environments_that_break_their_word(fault, said):
     assert said in str(broken.value)
 
 
+@pytest.mark.parametrize("kind", [float, np.float32])
+@pytest.mark.parametrize(
+    ("blue", "red", "winner"),
+    [
+        ([0.1, 0.2], [0.3, 0.0], 0),
+        ([0.3, 0.0], [0.2, 0.1], 0),
+        ([0.1, 0.2], [0.3, 0.01], -1),
+        ([9_000_001, 0], [9_000_000, 0], 1),
+        ([0, 0], [0, 0], 0),
+    ],
+)
+def test_equal_fractions_are_a_draw_and_whole_numbers_are_exact(blue, red, winner, kind):
+    wages = {"left_0": list(map(kind, blue)), "right_0": list(map(kind, red))}
+    assert np.sign(alone(Contest(time=2, wages=wages)).gap) == winner
+
+
 def test_an_info_that_decides_must_be_there():
     with pytest.raises(Unfit, match=r"env.score=info:wins: the last info of agent left_0 has only \['points'\]"):
         alone(Contest(), "info:wins")

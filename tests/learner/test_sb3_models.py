@@ -31,6 +31,7 @@ WRONG = [
     ("TRPO", {"n_steps": 1}, "options.n_steps must be >= 2 with options.normalize_advantage=true, but is 1"),
     ("DQN", {"train_freq": [4, "step"]}, "options.train_freq must be a whole number, but is [4, 'step']"),
     ("DQN", {"gradient_steps": -2}, "options.gradient_steps must be >= -1, but is -2"),
+    ("DQN", {"gradient_steps": 0}, "options.gradient_steps must be >= 1, or -1 for as many as transitions, but is 0."),
     ("DQN", {"exploration_fraction": 0}, "options.exploration_fraction must be > 0 and <= 1, but is 0"),
     ("DQN", {"buffer_size": 10**15}, "options cannot be used, as DQN says: Unable to allocate"),
 ]

@@ -133,13 +133,17 @@ def test_exploiters_are_frozen_and_begin_anew():
 
 
 def test_exploiters_that_found_what_they_sought_begin_anew_at_once():
-    words = ["opponents.exploiter_epochs=0", "opponents.exploiter_score=0.01"]
-    made = parts(*EXPLOITERS, *words, population=FOUR)
-    run, _ = epoch(begin(made), made)
-    assert {x.began for x in run.league.attempts} == {1}
-    never = parts(*EXPLOITERS, "opponents.exploiter_epochs=0", "opponents.exploiter_score=1", population=FOUR)
-    run, _ = epoch(begin(never), never)
-    assert {x.began for x in run.league.attempts} == {0}
+    """And those that lost everything do not, whatever their estimate owes to its prior."""
+    attempts = {}
+    for score in ("0.01", "1"):
+        words = ["opponents.exploiter_epochs=0", f"opponents.exploiter_score={score}", "opponents.exploit_share=0.5"]
+        made = parts(*EXPLOITERS, *words, population=FOUR)
+        run, _ = epoch(begin(made), made)
+        attempts[score] = run.league.attempts
+    assert {x.began for x in attempts["1"]} == {0}
+    lost = [x.record.beaten / x.record.games for x in attempts["1"]]
+    assert [x.began for x in attempts["0.01"]] == [int(1 - share > 0.01) for share in lost]
+    assert 1.0 in lost and min(lost) < 0.99
 
 
 def test_second_games_answer_games_among_the_population_alone():

@@ -21,6 +21,14 @@ def test_the_cells_of_a_grid_by_hand():
     np.testing.assert_allclose(PLAIN.centres[[0, 1, 2, 7]], [[0.5, 0.25], [0.5, 0.75], [1.5, 0.25], [3.5, 0.75]])
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "bins", "value", "cell"), [(0, 1, 100, 0.29, 29), (0, 4, 100, 1.16, 29), (1, 4, 10, 3.4, 8)]
+)
+def test_a_border_belongs_to_the_upper_cell_however_it_is_rounded(low, high, bins, value, cell):
+    strip = grid(np.array([low]), np.array([high]), np.array([bins]))
+    assert list(strip.cells(np.array([[value], [value - 1e-6]]))) == [cell, cell - 1]
+
+
 @given(st.lists(st.tuples(st.floats(0, 4), st.floats(0, 1)), min_size=1, max_size=20))
 def test_a_cell_of_a_grid_is_that_of_the_nearest_centre(points):
     points = np.array(points)
