@@ -13,6 +13,7 @@ from numpy.random import Generator
 
 from berteam_cli.command.inspect import printed
 from berteam_cli.config_commands import EvaluateConfig
+from berteam_cli.errors import InputError
 from berteam_cli.evaluation.calibration import deciles
 from berteam_cli.evaluation.conditioning import conditioning_rows, encounters
 from berteam_cli.evaluation.ending import elo_rows
@@ -26,7 +27,7 @@ from berteam_cli.evaluation.regression import FEWEST, regression
 from berteam_cli.evaluation.sheet import forget
 from berteam_cli.evaluation.strength import Match, Strength
 from berteam_cli.evaluation.truth import choose_teams
-from berteam_cli.folder import Manifest, logging_to
+from berteam_cli.folder import Manifest, logging_to, read_manifest
 from berteam_cli.holding import held
 from berteam_cli.population import names, policies
 from berteam_cli.reading import how_far, last_state
@@ -73,21 +74,30 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
     with held(place), logging_to(place):
         write_config(place, text)
         say(f"{folder} {far}")
-        manifest = Manifest.begun(place, run=str(folder), epoch=run.epoch, evaluated=far, seed=config.seed)
+        manifest = Manifest.begun(place, run=str(folder), seed=config.seed, **of_tables(place))
         with manifest.until_the_end(again="The same command goes on from there."):
             tables, facts = look.all()
-            manifest.add(**facts)
             for name in TABLES:
                 path = place / f"{name}.csv"
                 if name in tables:
                     write_table(path, COLUMNS[name], tables[name])
                 else:  # of an evaluation that had more to say
                     path.unlink(missing_ok=True)
+            manifest.add(epoch=run.epoch, evaluated=far, **facts)
             for sheet in SHEETS:
                 forget(place / sheet)
     files = [f"{name}.csv" for name in TABLES if name in tables]
     end(place, files, berteam("report", [folder]))
     return next(row[2] for row in tables["figures"] if row[1] == "expected_elo")
+
+
+def of_tables(place: Path) -> dict[str, Any]:
+    """Returns which epoch the tables in ``place`` are of, as their manifest says; they stay until others are whole."""
+    try:
+        told = read_manifest(place)
+    except InputError:
+        return {}
+    return {name: told[name] for name in ("epoch", "evaluated") if name in told}
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,9 @@ def from_file(path: Path, words: list[str], check: Check, launch: Launch) -> Non
     """
     held = plan.read_plan("sweep", path)
     shared, variants = plan.sweep_words(path, held)
-    command, shared = held["command"], [*plan.flags(words), *shared, *arguments(words).overrides]
+    behind = arguments(words).overrides
+    command, shared = held["command"], [*plan.flags(words), *shared, *behind]
+    variants = [[*variant, *(word for word in behind if not plan.of_hydra(word))] for variant in variants]
     for variant in variants:
         check(command, [*shared, *variant])
     shared, folder, _ = plan.planned(command, shared)

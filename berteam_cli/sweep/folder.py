@@ -79,9 +79,9 @@ class Sweep:
         folder = self.folder / str(job)
         with unheld(folder) as free:  # while it is read nobody begins or ends it, or else it is running
             try:
-                facts = read_manifest(folder)
-            except InputError:
-                facts = {}
+                facts = read_manifest(folder) if (folder / MANIFEST).exists() else {}
+            except InputError as error:
+                facts = {"status": "failed", "error": str(error)}
         status = str(facts.get("status", "waiting"))
         if status != "done" and not free:
             status = "running"

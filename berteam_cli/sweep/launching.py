@@ -102,13 +102,17 @@ class Batch:
 
 
 def beginning(sweep: Sweep, job: int) -> list[str]:
-    """Returns the words that let a job begin: go on where it can, begin again what failed."""
+    """Returns the words that let a job begin: go on where it can, begin again what failed.
+
+    One that somebody is at work on goes on, too: it may have ended by its turn.
+    """
     folder = sweep.folder / str(job)
     if not (folder / MANIFEST).exists():
         return []
     status, _ = sweep.status(job)
     began = sweep.command != "train" or any((folder / "checkpoint").glob("epoch_*"))
-    return [f"on_exists={'resume' if status == 'interrupted' and began else 'overwrite'}"]
+    goes_on = status == "running" or (status == "interrupted" and began)
+    return [f"on_exists={'resume' if goes_on else 'overwrite'}"]
 
 
 @contextmanager

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from berteam_cli import cli
+from berteam_cli.command.evaluate import Look
 from tests.browser import needs_chromium, opened
 from tests.command.conftest import SMALL_BERTEAM, TINY
 from tests.long_run import long_run
@@ -145,7 +146,12 @@ def test_without_matplotlib(berteam, tmp_path, monkeypatch):
     assert not (tmp_path / "run" / "report").exists()
 
 
-def test_an_evaluation_of_an_earlier_epoch_is_left_out(berteam, tmp_path):
+def interrupted(look):
+    raise KeyboardInterrupt
+
+
+def test_an_evaluation_of_an_earlier_epoch_is_left_out(berteam, tmp_path, monkeypatch):
+    """And so it is where a newer one was broken off, as its tables are still the earlier one's."""
     words = ["env=rps", "population=ppo6", "selector=mcaa", "games_per_epoch=4", "evaluation.games=400"]
     berteam("train", *words, "epochs=2", "out=run")
     berteam("evaluate", "run")
@@ -155,6 +161,13 @@ def test_an_evaluation_of_an_earlier_epoch_is_left_out(berteam, tmp_path):
     page = (tmp_path / "run" / "report" / "report.html").read_text()
     assert "looked at this run after epoch 2; it has gone on since" in page
     assert "Regression" not in page
+    with monkeypatch.context() as broken:
+        broken.setattr(Look, "all", interrupted)
+        berteam("evaluate", "run", code=130)
+    assert "Next: berteam evaluate run" in berteam("inspect", "run").stdout
+    berteam("report", "run", "on_exists=overwrite")
+    page = (tmp_path / "run" / "report" / "report.html").read_text()
+    assert "looked at this run after epoch 2; it has gone on since" in page
     berteam("evaluate", "run")
     berteam("report", "run", "on_exists=overwrite")
     assert "it has gone on since" not in (tmp_path / "run" / "report" / "report.html").read_text()

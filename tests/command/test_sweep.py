@@ -11,10 +11,12 @@ from collections import Counter
 
 import pandas as pd
 import pytest
+import yaml
 
 from berteam_cli.folder import Manifest
 from berteam_cli.sweep.folder import Sweep, make_table, working
 from berteam_cli.sweep.job import cores_each
+from berteam_cli.sweep.launching import beginning
 from berteam_cli.sweep.plan import NEEDS, spelt
 from berteam_cli.workers import available_cores
 from tests.command.conftest import BERTEAM
@@ -162,6 +164,24 @@ def test_a_file_lists_variants_and_what_each_is_combined_with(berteam, tmp_path)
     assert (rows.status == "done").all()
     refused = berteam("sweep", "jobs.yaml", "hydra.sweep.dir=my sweep", code=2).stderr
     assert "berteam sweep --resume" in refused
+    berteam("sweep", "jobs.yaml", "hydra.sweep.dir=short", "epochs=1", "seed=7")  # wins over all that the file says
+    configs = [yaml.safe_load((tmp_path / "short" / job / "config.yaml").read_text()) for job in ("0", "1")]
+    assert [(config["epochs"], config["seed"]) for config in configs] == [(1, 7), (1, 7)]
+    assert list(table(tmp_path / "short").status) == ["done"] * 2
+
+
+def test_a_job_that_ends_before_its_turn_is_not_begun_anew(tmp_path):
+    """Whoever is at work on it, `berteam resume` or a task of an earlier launch."""
+    sweep = Sweep(tmp_path, "train", {0: []})
+    sweep.keep()
+    (tmp_path / "0").mkdir()
+    with working(tmp_path / "0"):
+        Manifest.begun(tmp_path / "0")
+        assert beginning(sweep, 0) == ["on_exists=resume"]
+    assert beginning(sweep, 0) == ["on_exists=overwrite"]  # killed before its first checkpoint
+    (tmp_path / "0" / "manifest.json").write_text("{")
+    assert sweep.status(0)[0] == "failed"
+    assert "no readable manifest.json" in sweep.status(0)[1]["error"]
 
 
 @pytest.mark.parametrize(
