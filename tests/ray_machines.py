@@ -79,7 +79,7 @@ def processes(session):
     return found
 
 
-def until(condition, told=str):
+def until(condition, told):
     """Waits for ``condition()``; ``told()`` says what else has happened."""
     end = time.monotonic() + PATIENCE_S
     while not condition():

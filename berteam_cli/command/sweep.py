@@ -86,7 +86,7 @@ def from_file(path: Path, words: list[str], check: Check, launch: Launch) -> Non
     shared, variants = plan.sweep_words(path, held)
     behind = arguments(words).overrides
     command, shared = held["command"], [*plan.flags(words), *shared, *behind]
-    variants = [[*variant, *(word for word in behind if not plan.of_hydra(word))] for variant in variants]
+    variants = [[*variant, *behind] for variant in variants]
     for variant in variants:
         check(command, [*shared, *variant])
     shared, folder, _ = plan.planned(command, shared)
