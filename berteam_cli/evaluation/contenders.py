@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,7 @@ def contenders(folders: list[Path], trust: Collection[str] = ()) -> list[Contend
         trust: what their games may import.
 
     Raises:
-        InputError: one is no run or there twice, or their games differ.
+        InputError: one is no run or there twice, two are one training, or their games differ.
     """
     if len(folders) < 2:
         raise InputError("compare needs two runs at least; name their folders one after the other.")
@@ -79,7 +80,22 @@ def contenders(folders: list[Path], trust: Collection[str] = ()) -> list[Contend
         seen[folder.resolve()] = folder
     found = [contender(folder, trust) for folder in folders]
     check_game(found)
+    check_seeds(found)
     return sorted(found, key=lambda x: (sorted(map(str, x.config.items())), x.seed, str(x.folder)))
+
+
+def check_seeds(found: list[Contender]) -> None:
+    """Checks that no two runs are the same training: it would count as two seeds, and intervals would be too narrow.
+
+    Raises:
+        InputError: two are; with their folders.
+    """
+    for a, b in combinations(found, 2):
+        if a.seed == b.seed and a.config == b.config:
+            raise InputError(
+                f"{a.folder} and {b.folder} are the same training, of one config and seed={a.seed}; it would count as "
+                "two. Name one of them, or train another seed."
+            )
 
 
 def check_game(found: list[Contender]) -> None:

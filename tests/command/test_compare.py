@@ -102,10 +102,13 @@ def test_one_run_each_says_nothing_of_seeds(runs, berteam, tmp_path):
 
 def test_what_cannot_be_compared_is_refused_in_one_sentence(runs, berteam, tmp_path):
     berteam("train", *HANDS, "env.sides=3", "population=hands", "selector=uniform", "out=three")
+    again = ["selector=uniform", "seed=1", "workers=1", "checkpoint_every=1"]  # which change no number of it
+    berteam("train", *HANDS, "population=hands", *again, "out=again")
     for words, said in {
         ("any0",): "two runs at least",
         ("any0", "any0"): "named twice",
         ("any0", "./any1", "any1"): "named twice",
+        ("any0", "any1", "again"): "any1 and again are the same training, of one config and seed=1",
         ("any0", "nowhere"): "nowhere is no folder of a run",
         ("any0", "three"): "sides is 2 in any0 and 3 in three",
         ("any0", "paper0", "out=any0"): "is one of the runs",
