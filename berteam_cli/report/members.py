@@ -19,19 +19,24 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
 def aggression(source: Source) -> Plot:
-    """Returns how many members are how aggressive, in two groups."""
+    """Returns how many members are how aggressive, in the groups of members.csv."""
     name, title = "aggression", "How aggressive the members are"
     values = behaviour(source)
     if values is None:
         says = "No member's aggression is known: `berteam evaluate RUN` measures it (in games of mctf)."
         return Plot(name, title, says)
     figure, (plot,) = panels(height_in=3.0)
-    groups = {"defensive (below 1)": values[values < 1], "aggressive (1 and above)": values[values >= 1]}
+    groups = {
+        "defensive (below 1)": values[values < 1],
+        "neutral (1)": values[values == 1],
+        "aggressive (above 1)": values[values > 1],
+    }
     bins = np.arange(0, max(values.max(), 1.0) + 2 * BIN, BIN)  # 1 is the border of two of them
-    for (label, group), color in zip(groups.items(), SERIES[:2], strict=True):
-        plot.hist(group, bins=bins.tolist(), color=color, label=f"{label}: {len(group)}", edgecolor=LIGHT["card"])
+    labels = [f"{label}: {len(group)}" for label, group in groups.items()]
+    colors = [SERIES[0], SERIES[2], SERIES[1]]
+    plot.hist([*groups.values()], bins.tolist(), stacked=True, color=colors, label=labels, edgecolor=LIGHT["card"])
     plot.axvline(1, color=LIGHT["pale"], linewidth=1, linestyle=":")
-    plot.set(xlabel="aggression (0 keeps home, 1 between, above attacks)", ylabel="members")
+    plot.set(xlabel="aggression (below 1 defends, 1 neither, above attacks)", ylabel="members")
     ticks: Any = plot.yaxis.get_major_locator()  # matplotlib's own, which takes this
     ticks.set_params(integer=True)
     plot.legend()
