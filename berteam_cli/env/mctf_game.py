@@ -14,10 +14,10 @@ from berteam_cli.outcomes import HABITS, Floats, Ints
 from mctf.compiled import kernel, part
 from mctf.draws import next_uniform
 from mctf.geometry import apart, is_right, team_of, vehicles_of
-from mctf.kernel import RUNNING, TIME_OUT, finished, lead, step
+from mctf.kernel import RUNNING, finished, lead, step
 from mctf.observe import normalise, observe
 from mctf.practice import Starts, practise
-from mctf.rewards import Reward, rewards
+from mctf.rewards import Reward, is_over, rewards
 from mctf.rules import ACTIONS, Rules
 from mctf.scripted import act as act_fixed
 from mctf.start import forget, reset
@@ -113,7 +113,7 @@ def play_games(
         if record:
             note(results, b, moment, seen)
         results.steps[b] = moment
-        results.terminated[b] = finished(state, 0, rules) != TIME_OUT
+        results.terminated[b] = is_over(finished(state, 0, rules), reward)
         settle(state, rules, b, results)
 
 

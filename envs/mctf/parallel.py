@@ -170,7 +170,8 @@ class MctfEnv(ParallelEnv[str, Any, Any]):
     ) -> tuple[Observations, dict[str, float], dict[str, bool], dict[str, bool], Infos]:
         """Plays one step; returns observations, rewards, terminations, truncations and infos.
 
-        A game that is decided is terminated, one whose time is up is truncated; then all agents leave.
+        A game that is decided is terminated, one whose time is up is truncated, or terminated if the reward pays the
+        result (``rewards.Reward.ends_on_time``); then all agents leave.
 
         Args:
             actions: one of each agent's action space.
@@ -190,12 +191,13 @@ class MctfEnv(ParallelEnv[str, Any, Any]):
         end, agents = self._lanes.end[0], self.agents
         if end != RUNNING:
             self.agents = []
+        truncated = bool(end == TIME_OUT and not self._reward.ends_on_time)
         observations, infos = self._shown()
         return (
             observations,
             dict(zip(agents, self._lanes.paid[0].tolist(), strict=True)),
-            dict.fromkeys(agents, bool(end not in (RUNNING, TIME_OUT))),
-            dict.fromkeys(agents, bool(end == TIME_OUT)),
+            dict.fromkeys(agents, bool(end != RUNNING and not truncated)),
+            dict.fromkeys(agents, truncated),
             infos,
         )
 
@@ -300,8 +302,10 @@ def _timed(rules: Rules, max_cycles: int | None, given: Mapping[str, Any]) -> Ru
     if given.get("max_time_s") is not None:
         raise ValueError("max_cycles and max_time_s say the same, in steps and in s; give one of them.")
     steps = checked_count("max_cycles", max_cycles)
-    # A little less than the time of so many steps, which is a sum of rounded numbers and may fall short of it
-    return make_rules(**dict(given) | {"max_time_s": steps * rules.substeps * rules.tau_s * (1.0 - 1e-9)})
+    # A little less than the time of so many steps, which is a sum of rounded numbers and may fall short of it. Where
+    # the clock does not overrun, a game is over near its time, and of many steps the last ones are near.
+    time_s = steps * rules.substeps * rules.tau_s * (1.0 - 1e-9)
+    return make_rules(**dict(given) | {"max_time_s": time_s, "clock_overruns": True})
 
 
 def _checked_seed(seed: Any) -> int:

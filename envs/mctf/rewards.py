@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mctf.compiled import kernel, part
 from mctf.geometry import apart, home, team_of
-from mctf.kernel import RUNNING, finished, lead
+from mctf.kernel import RUNNING, TIME_OUT, finished, lead
 from mctf.rules import BLUE, Rules
 from mctf.shaping import Shaping, gained, make_shaping, share
 from mctf.state import State
@@ -111,6 +111,8 @@ class Reward(NamedTuple):
         own: compiled; takes (len(TERMS),), and (O,) twice: the unnormalised observation before and after the step.
         shaping: what is added, and how the team shares.
         factors: (V, len(TERMS)) by what the weights are multiplied for each vehicle; none, (0, 0), for all alike.
+        ends_on_time: whether a weight pays the result. Then it is all over for learners when time is up: nothing tells
+            them the time, so with the value of what would follow they would be paid the result again and again.
     """
 
     weights: NDArray[np.float64]
@@ -118,6 +120,7 @@ class Reward(NamedTuple):
     own: Any
     shaping: Shaping
     factors: NDArray[np.float64] = np.zeros((0, 0))
+    ends_on_time: bool = False
 
 
 def progress(terms: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
@@ -164,13 +167,15 @@ def make_reward(
             raise ValueError(f"reward_weights[{term!r}] must be a finite number, but is {weight!r}.")
     named = WEIGHTS.get(reward, {}) if isinstance(reward, str) else {}
     numbers, shaped = np.array([given.get(term, named.get(term, 0.0)) for term in TERMS]), make_shaping(shaping)
+    ends = bool(numbers[[WON, LOST, DRAWN]].any())
     if isinstance(reward, str) and reward in WEIGHTS:
         own = progress if reward == "custom_rew" else nothing
-        return Reward(numbers, own is progress, cfunc(OWN_SIGNATURE, nogil=True, cache=True)(own), shaped)
+        compiled = cfunc(OWN_SIGNATURE, nogil=True, cache=True)(own)
+        return Reward(numbers, own is progress, compiled, shaped, ends_on_time=ends)
     own = _imported(reward) if isinstance(reward, str) else reward
     if not callable(own):
         raise ValueError(f"reward must be one of {tuple(WEIGHTS)}, a function or module:function, but is {reward!r}.")
-    return Reward(numbers, True, _compiled(own), shaped)
+    return Reward(numbers, True, _compiled(own), shaped, ends_on_time=ends)
 
 
 @cache
@@ -245,10 +250,16 @@ def rewards(
         if reward.has_own:
             total += reward.own(terms, before[v], after[v])
         if reward.shaping.potential != 0.0:
-            total += reward.shaping.potential * gained(state, b, v, end, reward.shaping, rules)
+            total += reward.shaping.potential * gained(state, b, v, is_over(end, reward), reward.shaping, rules)
         out[v] = total
     if reward.shaping.team_share != 0.0:
         share(out, reward.shaping.team_share, rules)
+
+
+@part
+def is_over(end: int, reward: Reward) -> bool:
+    """Returns whether nothing follows for learners in a game that stands as ``end`` says, as of ``finished``."""
+    return end != RUNNING and (end != TIME_OUT or reward.ends_on_time)
 
 
 @part

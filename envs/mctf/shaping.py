@@ -3,7 +3,8 @@
 A potential phi of the state pays ``weight * (discount * phi(after) - phi(before))``. Summed over a game with the
 learner's own discount all but the first and the last phi cancel, so the order of policies stays what it is (Ng, Harada
 and Russell, Policy invariance under reward transformations, ICML 1999). Where the rules end a game nothing follows, and
-phi is 0; where its time is up, learners go on with the value of what would follow, and phi stays.
+phi is 0; where its time is up, learners go on with the value of what would follow, and phi stays, unless the reward
+pays the result and so ends there.
 """
 
 import math
@@ -14,7 +15,6 @@ import numpy as np
 
 from mctf.compiled import part
 from mctf.geometry import apart, home, team_of, vehicles_of
-from mctf.kernel import RUNNING, TIME_OUT
 from mctf.rules import BLUE, RED, Rules
 from mctf.state import State
 from mctf.words import did_you_mean
@@ -65,13 +65,13 @@ def make_shaping(given: Mapping[str, Any] | None = None) -> Shaping:
 
 
 @part
-def gained(state: State, b: int, v: int, end: int, shaping: Shaping, rules: Rules) -> float:
-    """Returns what vehicle ``v`` gained in potential by the last step; ``end`` says how the game is over, if it is."""
+def gained(state: State, b: int, v: int, over: bool, shaping: Shaping, rules: Rules) -> float:
+    """Returns what vehicle ``v`` gained in potential by the last step; ``over`` says whether nothing follows it."""
     us = team_of(v, rules)
     was_tagged, was_carrying = state.was_tagged[b, v], state.was_carrying[b, v]
     before = phi(state.was_pos[b, v, 0], state.was_pos[b, v, 1], was_tagged, was_carrying, us, shaping, rules)
     after = 0.0
-    if end in (RUNNING, TIME_OUT):
+    if not over:
         tagged, carries = state.is_tagged[b, v], state.has_flag[b, v]
         after = phi(state.pos[b, v, 0], state.pos[b, v, 1], tagged, carries, us, shaping, rules)
     return shaping.potential_discount * after - before

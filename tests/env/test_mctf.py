@@ -28,7 +28,7 @@ def test_fixed_policies_play_as_in_the_package(team_size):
     np.testing.assert_array_equal(outcomes.scores[:, 0], (np.sign(gap) + 1) / 2)
 
 
-@pytest.mark.parametrize("reward", ["custom_rew2", "custom_rew", "sparse"])
+@pytest.mark.parametrize("reward", ["custom_rew2", "custom_rew", "sparse", "outcome"])
 def test_experience_is_what_the_pettingzoo_environment_gives(reward):
     """The same actions in the PettingZoo environment: the same observations, rewards and end."""
     games = mctf(1, reward=reward, max_time_s=250.0)
@@ -51,6 +51,34 @@ def test_experience_is_what_the_pettingzoo_environment_gives(reward):
     assert all(terminations.values()) == seen.terminated[0]
     assert all(truncations.values()) == (not seen.terminated[0])
     assert seen.rewards[0, :, : outcomes.steps[0]].any()
+
+
+def still(terms, before, after):
+    return 0.0
+
+
+@pytest.mark.parametrize(
+    ("paid", "ends"),
+    [
+        ({"reward": "custom_rew2"}, False),
+        ({"reward": "outcome"}, True),
+        ({"reward": "outcome", "reward_weights": {"won": 0.0, "lost": 0.0}}, False),
+        ({"reward": "sparse", "reward_weights": {"drawn": -0.5}}, True),
+        ({"reward": still}, False),
+        ({"reward": still, "reward_weights": {"lost": -1.0}}, True),
+    ],
+)
+def test_where_the_result_is_paid_nothing_follows_the_end_on_time(paid, ends):
+    """Else learners, who cannot see the clock, would add the value of a game that pays its result again and again."""
+    lineup = pairings(np.array([[6, 6]]), np.array([[6, 6]]))
+    _, seen = mctf(1, max_time_s=5.0, **paid).play(fixed_policies(range(7)), lineup, 9, record=True)
+    env = parallel_env(max_time_s=5.0, **paid)
+    env.reset(seed=1)
+    while env.agents:
+        _, _, terminations, truncations, _ = env.step(dict.fromkeys(env.agents, 16))
+    assert seen.terminated[0] == ends
+    assert set(terminations.values()) == {ends}
+    assert set(truncations.values()) == {not ends}
 
 
 def test_the_random_policy_differs_from_game_to_game_and_not_from_run_to_run():

@@ -161,10 +161,10 @@ def sequences():
     return actions
 
 
-def returns(actions, discount, **shaping):
+def returns(actions, discount, weights=None, **shaping):
     """Returns (B, V) discounted sums of rewards, (B, V) discounted last potentials by hand, and how games ended."""
     rules = make_rules(**RULES)
-    batch = Batch(len(actions), rules, shaping=shaping)
+    batch = Batch(len(actions), rules, reward_weights=weights, shaping=shaping)
     batch.start(np.zeros(len(actions), np.int64))
     sums, last, ends = np.zeros((len(actions), 4)), np.zeros((len(actions), 4)), np.zeros(len(actions), np.int64)
     start = worth(batch._lanes.state, rules)
@@ -203,6 +203,14 @@ def test_the_order_of_policies_stays(sequences, discount):
         order = np.argsort(plain[decided, v])
         assert (np.diff(shaped[decided, v][order]) > -1e-9).all()
         assert np.ptp(plain[decided, v]) > 1e-3
+
+
+def test_the_order_stays_where_the_result_is_paid(sequences):
+    """There nothing follows the end on time either, and what a potential adds is that of the start in every game."""
+    plain, start, last, ends = returns(sequences, 0.99, {"drawn": -2.0})
+    shaped, *_ = returns(sequences, 0.99, {"drawn": -2.0}, potential=2.5, potential_discount=0.99)
+    assert np.abs(last[ends == TIME_OUT]).max() > 1e-7
+    assert shaped - plain == pytest.approx(-2.5 * start, abs=1e-9)
 
 
 def test_another_discount_does_not_cancel(sequences):
