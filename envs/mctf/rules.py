@@ -141,8 +141,8 @@ def make_rules(
         team_size: vehicles of a team, or of blue and of red.
         flag_homes_m: (x, y) of blue's and of red's flag; None for an eighth of the width from the wall behind it.
         max_speed: m/s; None for that of the vehicle, ``MAX_SPEED``.
-        untag_radius_m: None for the catch radius, and for ``untag_at_keepout`` 1 m more than the keep-out circle, if
-            that is larger.
+        untag_radius_m: None for the catch radius, and for ``untag_at_keepout`` 1 m more than the circle that keeps a
+            vehicle out, if that is larger.
         **given: other entries of ``profiles.PROFILES``, described there and at ``Rules``; None for the profile's.
 
     Raises:
@@ -166,12 +166,15 @@ def make_rules(
     if untag_radius_m is None:
         untag_radius_m = numbers["catch_radius_m"]
         if switches["untag_at_keepout"]:
-            untag_radius_m = max(untag_radius_m, numbers["flag_keepout_m"] + 1.0)
+            wider = 0.0 if first["keepout_rule"] else numbers["agent_radius_m"]
+            untag_radius_m = max(untag_radius_m, numbers["flag_keepout_m"] + wider + 1.0)
     if numbers["catch_radius_m"] >= width / 2.0:
         raise ValueError(
             f"catch_radius_m must be < {width / 2.0:g}, half of world_size_m[0], but is {numbers['catch_radius_m']:g}."
         )
     sizes = _sizes(team_size)
+    if first["wall_rule"] and words["starts"] != STARTS_RANDOM:
+        _check_starts(max(sizes), height, numbers["agent_radius_m"])
     left, right = (width / 8.0, height / 2.0), (7.0 * width / 8.0, height / 2.0)
     homes = (right, left) if first["blue_side"] else (left, right)
     if flag_homes_m is not None:
@@ -233,6 +236,17 @@ def _check_field(width: float, height: float, margin: float) -> None:
                 f"{name} must be > {homes * margin:g}, {homes} times agent_radius_m and the keep-out circle together "
                 f"({margin:g} m), so that a vehicle fits between its flag and the wall, but is {extent:g}."
             )
+
+
+def _check_starts(size: int, height: float, agent_radius: float) -> None:
+    """Checks that nobody starts at a wall: who bounces is put back to where it was, there for ever."""
+    if height / (size + 1) < agent_radius:
+        largest = math.floor(height / agent_radius) - 1
+        raise ValueError(
+            f"team_size must be at most {largest}, so that nobody starts within agent_radius_m ({agent_radius:g} m) of "
+            f"a wall of a field {height:g} m high, but is {size}. A larger world_size_m, a smaller agent_radius_m or "
+            "starts='random' has room for more."
+        )
 
 
 def _homes(

@@ -238,6 +238,8 @@ def test_actions_must_be_of_the_agents():
         ({"render_mode": "rgb"}, "render_mode must be one of .* Did you mean rgb_array?"),
         ({"team_size": 0}, "team_size"),
         ({"team_size": 10**6}, "team_size must be at most"),
+        ({"team_size": (2, 60)}, "team_size must be at most 49, so that nobody starts within agent_radius_m"),
+        ({"agent_radius_m": 20.0, "flag_keepout_m": 0.0, "team_size": 6}, "team_size must be at most 4,"),
         ({"world_size_m": (8, 8)}, r"world_size_m\[0\] must be >"),
         ({"profile": "clear"}, "profile must be one of .* Did you mean clean?"),
         ({"max_scores": 3}, "max_scores is no rule. Did you mean max_score?"),

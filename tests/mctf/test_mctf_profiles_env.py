@@ -19,6 +19,7 @@ from stable_baselines3.common.utils import set_random_seed
 
 import mctf
 from mctf import mctf_v0, render
+from mctf.kernel import RUNNING, TIME_OUT, finished
 from mctf.profiles import PROFILES
 
 CASES = [(profile, size) for profile in PROFILES for size in range(1, 11)]
@@ -81,6 +82,18 @@ def test_max_cycles_is_a_number_of_steps(profile, substeps):
         assert env.agents
         env.step(dict.fromkeys(env.agents, 4))
     assert not env.agents
+
+
+@pytest.mark.parametrize("profile", ["pyquaticus-2024-06", "clean"])
+def test_the_last_of_many_steps_is_played(profile):
+    """Where the clock does not overrun, a game of the rules is over near its time already."""
+    env = mctf.parallel_env(max_cycles=200_000, profile=profile)
+    env.reset()
+    state = env._lanes.state
+    for steps, end in ((199_999, RUNNING), (200_000, TIME_OUT)):
+        substeps = np.full(steps * env.rules.substeps, env.rules.tau_s)
+        state.time[0] = np.add.accumulate(substeps)[-1]  # one after the other, as the clock runs
+        assert finished(state, 0, env.rules) == end
 
 
 def test_max_cycles():

@@ -212,6 +212,8 @@ def test_untag_at_keepout():
     assert make_rules("clean", flag_keepout_m=12.0).untag_radius_m == 13.0
     assert make_rules("clean", flag_keepout_m=5.0).untag_radius_m == 10.0
     assert make_rules("clean", flag_keepout_m=12.0, untag_radius_m=7.0).untag_radius_m == 7.0
+    # After a move the circle is wider by agent_radius_m, and who is tagged must come nearer than the untag radius
+    assert make_rules("clean", flag_keepout_m=9.0, keepout_rule="after").untag_radius_m == 12.0
 
 
 @pytest.mark.parametrize(("overruns", "steps"), [(True, 1201), (False, 1200)])
