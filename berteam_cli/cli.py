@@ -165,11 +165,10 @@ def verify(word: str, config: Any, keys: list[str]) -> None:
 
     if word == "train":
         from berteam_cli.logger.opening import check_logger  # noqa: PLC0415
-        from berteam_cli.stored import goes_on  # noqa: PLC0415
+        from berteam_cli.stored import checkpointed  # noqa: PLC0415
 
         check_logger(config.logger)
-        folder = Path(config.out) if config.out else None
-        build.parts(config, stored=folder if goes_on(config, folder) else None)
+        build.parts(config, stored=checkpointed(config, Path(config.out) if config.out else None))
     elif word == "tournament":
         from berteam_cli.command import entrants  # noqa: PLC0415
 
@@ -217,6 +216,10 @@ def alone(word: str, cfg: DictConfig) -> float:
 
     from berteam_cli.config import checked  # noqa: PLC0415
 
+    if word == "train":
+        from berteam_cli.stored import as_begun  # noqa: PLC0415
+
+        cfg = as_begun(cfg)
     config, text = checked(cfg), OmegaConf.to_yaml(cfg, resolve=True)
     out = getattr(config, "out", None)
     return command_of(word)(config, text, Path(out) if out else None)

@@ -18,7 +18,7 @@ from berteam_cli.config import SCHEMAS
 from berteam_cli.config_commands import TrainConfig
 from berteam_cli.config_members import IslandConfig
 from berteam_cli.errors import InputError
-from berteam_cli.folder import CONFIG, MANIFEST, Manifest, claim, write_text
+from berteam_cli.folder import CONFIG, MANIFEST, Manifest, claim, newest, write_text
 from berteam_cli.holding import held
 from berteam_cli.trust import check_trusted
 
@@ -135,6 +135,29 @@ def goes_on(config: TrainConfig, folder: Path | None) -> bool:
     return config.on_exists == "resume" and folder is not None and os.path.exists(folder / CONFIG)
 
 
+def checkpointed(config: TrainConfig, folder: Path | None) -> Path | None:
+    """Returns ``folder`` if ``config`` goes on from a checkpoint there; what ended before its first begins again."""
+    return folder if folder is not None and goes_on(config, folder) and newest(folder) >= 0 else None
+
+
+def as_begun(config: DictConfig) -> DictConfig:
+    """Returns the composed config of a training as it may go on: what is a share of its epochs stays as it began.
+
+    Raises:
+        InputError: it goes on with a run whose config cannot be read.
+    """
+    folder: Any = Path(config.out) if config.out else None
+    given: Any = config  # its keys are those of a TrainConfig
+    if not goes_on(given, folder) or not OmegaConf.is_interpolation(config.optimizer, "protect_new"):
+        return config
+    begun = OmegaConf.select(plain_config(folder), "optimizer.protect_new")
+    if not isinstance(begun, int):
+        return config
+    config = config.copy()
+    config.optimizer.protect_new = begun
+    return config
+
+
 def check_same(folder: Path, text: str) -> None:
     """Checks that the config ``text`` can go on with the run in ``folder``.
 
@@ -171,7 +194,7 @@ def begun(folder: Path, on_exists: str, text: str, what: str, facts: dict[str, A
             check_same(folder, text)
             if Manifest.of(folder).facts["status"] == "done":
                 raise InputError(f"out={folder} holds this {what} already, and it is done.")
-            yield Manifest.resumed(folder)
+            yield Manifest.resumed(folder, **facts)
         else:
             claim(folder, on_exists)
             write_config(folder, text)

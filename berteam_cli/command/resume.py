@@ -11,7 +11,7 @@ from omegaconf.errors import OmegaConfBaseException
 from berteam_cli.command.train import train
 from berteam_cli.config import checked, one_line
 from berteam_cli.errors import InputError, did_you_mean
-from berteam_cli.folder import read_manifest
+from berteam_cli.folder import newest, read_manifest
 from berteam_cli.stored import MAY_CHANGE, stored_config, whole_choice
 from berteam_cli.sweep.folder import JOBS, working, write_table
 from berteam_cli.trust import told
@@ -31,6 +31,11 @@ def resume(folder: Path, overrides: list[str]) -> float:
     read_manifest(folder)
     trust, overrides = told(overrides)
     stored = stored_config(folder, trust)
+    if newest(folder) < 0 and any(member.trust for member in stored.population.members):
+        raise InputError(
+            f"{folder} has no checkpoint yet, so its members would be read from their files anew, and what a run's "
+            "folder trusts (trust: true) is not: give the command that began it again, with on_exists=resume."
+        )
     for override in overrides:
         key, equals, _ = override.partition("=")
         if not equals:

@@ -31,7 +31,7 @@ from berteam_cli.pace import Pace
 from berteam_cli.recording import Recorder, also_growing
 from berteam_cli.records import Tables
 from berteam_cli.stopping import Stop, stoppable
-from berteam_cli.stored import check_same, goes_on, write_config
+from berteam_cli.stored import check_same, checkpointed, goes_on, write_config
 from berteam_cli.training import Parts, Run, begin, epoch
 
 log = logging.getLogger("berteam")
@@ -52,7 +52,7 @@ def train(config: TrainConfig, text: str, folder: Path | None = None) -> float:
     """
     folder = folder or new_folder("train")
     check_logger(config.logger)
-    parts = build.parts(config, stored=folder if goes_on(config, folder) else None)
+    parts = build.parts(config, stored=checkpointed(config, folder))
     with held(folder):
         expected = held_run(config, text, folder, parts)
     show(folder, 10)

@@ -148,6 +148,26 @@ def test_beside_others_they_are_cloned_and_go_on_after_their_files_are_gone(run,
     assert "population.members is" in berteam(*("train", *words[:-1], "out=parts", "on_exists=resume"), code=2).stderr
 
 
+def test_what_ended_before_its_first_checkpoint_reads_its_files_again(run, berteam, tmp_path):
+    berteam("export", "run", "agent=1", "out=a.zip")
+    words = [*RPS, "population=imported", "team_size=1", files("a.zip")]
+    berteam("train", *words, "out=whole")
+    for again in (("resume", "cut"), ("train", *words, "out=cut", "on_exists=resume")):
+        shutil.rmtree(tmp_path / "cut", ignore_errors=True)
+        shutil.copytree(tmp_path / "whole", tmp_path / "cut")
+        shutil.rmtree(tmp_path / "cut" / "checkpoint")
+        berteam(*again)
+        for name in UNTIMED:
+            assert (tmp_path / "whole" / f"{name}.csv").read_bytes() == (tmp_path / "cut" / f"{name}.csv").read_bytes()
+    # In a folder that came from elsewhere nobody has said that code in the file may run.
+    shutil.rmtree(tmp_path / "cut" / "checkpoint")
+    config = tmp_path / "cut" / "config.yaml"
+    config.write_text(config.read_text().replace("trust: false", "trust: true"))
+    said = berteam("resume", "cut", code=2).stderr
+    assert "cut has no checkpoint yet" in said
+    assert "give the command that began it again, with on_exists=resume" in said
+
+
 EXPORTS = {
     ("nowhere", "agent=1"): "nowhere is no folder of a run",
     ("run",): "agent must say which member is exported, such as agent=3",

@@ -285,6 +285,21 @@ def test_train_goes_on_with_a_run_that_it_is_told(berteam, tmp_path):
     assert "nowhere is no folder of a run" in berteam("train", "resume=nowhere", code=2).stderr
 
 
+def test_what_is_a_share_of_the_epochs_stays_as_it_began(berteam, tmp_path):
+    """However a run is told to go on, newcomers are protected for an eighth of the epochs it began with."""
+    learner = ["population=ppo6", "learner.n_steps=4", "learner.minibatch_size=4", "evaluation.games=0"]
+    words = ["train", "env=rps", "selector=mcaa", *learner]
+    for name in ("one", "other"):
+        berteam(*words, "epochs=16", f"out={name}")
+    berteam(*words, "epochs=24", "out=one", "on_exists=resume")
+    berteam("resume", "other", "epochs=24")
+    for name in UNTIMED:
+        assert (tmp_path / "one" / f"{name}.csv").read_bytes() == (tmp_path / "other" / f"{name}.csv").read_bytes()
+    assert "protect_new: 2\n" in (tmp_path / "one" / "config.yaml").read_text()
+    said = berteam(*words, "epochs=32", "optimizer.protect_new=3", "out=one", "on_exists=resume", code=2).stderr
+    assert "optimizer.protect_new is 3, but the run in one was begun with 2" in said
+
+
 def test_a_run_killed_in_the_middle_of_rows_is_read(berteam, tmp_path):
     words = ["train", "env=rps", "population=hands", "optimizer=fixed", "selector=mcaa", "epochs=4", "out=run"]
     berteam(*words, "evaluation.games=0", "record_every=2")
