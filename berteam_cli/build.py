@@ -131,14 +131,15 @@ def parts(config: TrainConfig, *, stored: Path | None = None, read_only: bool = 
     selecting = selector(config, field_of(config, islands, playing.env), playing.env, device)
     if selecting.answers and own % 2:
         raise InputError(
-            "games_per_epoch must be even with selector.observations=previous_game, which plays every opponent twice, "
-            f"but is {config.games_per_epoch}{f', {others.games} of them against opponents' if others.games else ''}."
+            f"games_per_epoch{f' less the {others.games} against opponents' if others.games else ''} must be even with "
+            f"selector.observations=previous_game, which plays every opponent twice, but is {own}."
         )
     watched = improving.learns or selecting.observes
     games_kept = own // rounds(selecting) + others.games if watched and not read_only else 0
     if not read_only:
         # Both halves of an epoch of answers, and all of it in one piece.
-        check_memory(islands, playing.env, 4 * games_kept if selecting.answers else games_kept)
+        room = 4 * games_kept if selecting.answers else games_kept
+        check_memory(islands, playing.env, room, config.games_per_epoch)
     return Parts(
         seed=config.seed,
         games_per_epoch=config.games_per_epoch,

@@ -57,11 +57,12 @@ def archipelago(config: TrainConfig, game: Env, device: str, *, stored: bool) ->
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or name.lower() in NO_NAMES:
             raise InputError(f"{key}: an island's name must be a word that tables can hold, but is {name!r}.")
         first = islands[-1].first + islands[-1].size if islands else 0
+        typed = len(config.population.islands) == 1 and settings.learner == config.learner
+        of_learner = "learner" if typed else f"{key}.learner"
         if settings.learner.name == "fixed":
-            made = fixed_members(settings, game, key)
+            made = fixed_members(settings, game, key, of_learner)
         else:
-            typed = len(config.population.islands) == 1 and settings.learner == config.learner
-            made = learner(settings.learner, game, "learner" if typed else f"{key}.learner", device)
+            made = learner(settings.learner, game, of_learner, device)
         islands.append(Island(name, first, settings.size, made, name in exploiters))
     if members := config.population.members:
         if MEMBERS in config.population.islands:
@@ -103,17 +104,28 @@ def imported_members(members: list[MemberConfig], game: Env, *, stored: bool) ->
     return Imported(tuple(called), *size, None if stored else joined(tables))
 
 
-def fixed_members(settings: IslandConfig, game: Env, key: str) -> Learner[Any]:
+def fixed_members(settings: IslandConfig, game: Env, key: str, of_learner: str) -> Learner[Any]:
     """Returns the learner of an island of fixed policies.
+
+    Args:
+        settings: of the island.
+        game: that is played.
+        key: of the island, for messages.
+        of_learner: key of its learner's settings, for messages.
 
     Raises:
         InputError: a policy is not the game's, or they are not as many as the island has members.
     """
     names = list(settings.learner.policies)  # type: ignore[attr-defined]
-    check_policies(names, game, f"{key}.learner.policies")
+    check_policies(names, game, f"{of_learner}.policies")
+    if not names:
+        raise InputError(
+            f"{of_learner}.policies must name {settings.size} of {', '.join(game.fixed_policies)}, one for each "
+            f"member, but is empty."
+        )
     if len(names) != settings.size:
         raise InputError(
-            f"{key}.size must be {len(names)}, as {key}.learner.policies names so many, but is {settings.size}."
+            f"{key}.size must be {len(names)}, as {of_learner}.policies names so many, but is {settings.size}."
         )
     return Fixed(tuple(game.fixed_policies.index(x) for x in names), game.fixed_policies)
 

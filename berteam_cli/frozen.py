@@ -21,7 +21,7 @@ from berteam_cli.env.base import Env
 from berteam_cli.errors import InputError, RunError
 from berteam_cli.fitting import check_policies
 from berteam_cli.folder import newest, read_manifest
-from berteam_cli.founding import archipelago
+from berteam_cli.founding import MEMBERS, archipelago
 from berteam_cli.learner.base import Learner
 from berteam_cli.learner.fixed import Fixed
 from berteam_cli.learner.imported import Imported
@@ -54,6 +54,11 @@ def everybody(config: TrainConfig, game: Env, device: str, *, stored: Path | Non
         found = of_run(Path(config.population.run), config, game)
     for island in found:
         if island.name in {other.name for other in islands}:
+            if island.name == MEMBERS:
+                raise InputError(
+                    f"{KEY}={config.population.run} has members from files, too, which are on an island {MEMBERS} like "
+                    "those of population.members; leave these out, or that run."
+                )
             raise InputError(
                 f"{KEY}={config.population.run} has an island {island.name}, as this population has; "
                 f"give that of this one another name, or leave it to the run with population=of_run."

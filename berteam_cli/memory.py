@@ -42,13 +42,14 @@ def state_bytes(island: Island) -> int:
     return island.learner.state_bytes(island.size)
 
 
-def check_memory(islands: tuple[Island, ...], env: Env, games: int) -> None:
+def check_memory(islands: tuple[Island, ...], env: Env, games: int, games_per_epoch: int) -> None:
     """Checks that what a run keeps in memory fits there, that of each device on it.
 
     Args:
         islands: of the population.
         env: the game.
-        games: that are learnt from in one epoch.
+        games: room for so many is needed.
+        games_per_epoch: the setting that says how many.
 
     Raises:
         InputError: it does not; with the setting that takes most and the largest value that would fit.
@@ -57,18 +58,18 @@ def check_memory(islands: tuple[Island, ...], env: Env, games: int) -> None:
         there = [island for island in islands if getattr(island.learner, "device", "cpu") == device]
         if device == "cpu":
             whole = available()
-            fits_there(there, trajectory_bytes(env, games), games, (whole - BASE) // COPIES, whole)
+            fits_there(there, trajectory_bytes(env, games), games_per_epoch, (whole - BASE) // COPIES, whole)
         elif there:
             free, whole = torch.cuda.mem_get_info()
-            fits_there(there, 0, games, free, whole)
+            fits_there(there, 0, games_per_epoch, free, whole)
 
 
 def fits_there(islands: list[Island], played: int, games: int, limit: int, whole: int) -> None:
-    """Checks that members and the trajectories of ``games`` games, of ``played`` bytes, take at most ``limit`` bytes.
+    """Checks that members and the trajectories of an epoch, of ``played`` bytes, take at most ``limit`` bytes.
 
     Args:
         islands: the members.
-        played: bytes.
+        played: bytes, in proportion to ``games``.
         games: of one epoch.
         limit: bytes.
         whole: bytes that there are, for the message.

@@ -59,6 +59,22 @@ def test_the_largest_buffer_that_is_said_to_fit_does(learner, key, step, monkeyp
         limited(monkeypatch, learner, f"learner.{key}={fits + step}", limit)
 
 
+@pytest.mark.parametrize("more", [[], ["selector.observations.use=previous_game"]])
+def test_as_many_games_as_are_said_to_fit_do(more, monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: 2 * 2**30)
+
+    def made(games):
+        return build.parts(checked(composed("population=ppo6", f"games_per_epoch={games}", *more)), read_only=False)
+
+    with pytest.raises(InputError, match=r"games_per_epoch must be <= \d+, but is 10000: ") as refused:
+        made(10_000)
+    fits = int(str(refused.value).split("<= ")[1].split(",")[0]) // 2 * 2
+    monkeypatch.setattr(build, "blank_trajectories", lambda env, games: None)  # nothing is to be taken
+    made(fits)
+    with pytest.raises(InputError):
+        made(fits + 10)
+
+
 def test_what_a_process_is_limited_to_counts():
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     whole = memory.available()

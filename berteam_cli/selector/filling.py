@@ -82,7 +82,8 @@ def sharpened(odds: Odds, power: float) -> Odds:
     """Returns ``odds`` with every chance to a ``power``, > 0, and normalised; 1 changes nothing."""
 
     def sharp(teams: Ints, known: Ints, places: Ints | None = None) -> Floats:
-        chances = odds(teams, known, places) ** power
+        chances = odds(teams, known, places)
+        chances = (chances / chances.max(axis=-1, keepdims=True)) ** power  # else all may be too small for a float
         return chances / chances.sum(axis=-1, keepdims=True)
 
     return odds if power == 1 else sharp

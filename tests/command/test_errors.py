@@ -124,6 +124,10 @@ CASES = {
     ("train", "selector.side=separate"): "selector.side=separate needs selector.dataset=per_side",
     ("train", "selector.observations=selv"): "selector.observations.use must be one of none, previous_game, self",
     ("train", "selector.observations=previous_game", "games_per_epoch=5"): "games_per_epoch must be even",
+    (
+        *("train", "env=rps", "population=ppo6", "selector.observations=previous_game"),
+        *("opponents=past", "games_per_epoch=6"),
+    ): "games_per_epoch less the 3 against opponents must be even with .*, but is 3",
     ("train", "selector.loss=l1"): "selector.weighting",
     ("train", "selector.opponents=average"): "selector.opponents=average needs selector.loss=l1",
     ("train", "selector=mcaa", "selector.top_fraction=0"): "selector.top_fraction must be > 0",

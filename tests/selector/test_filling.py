@@ -131,6 +131,15 @@ def test_sharpened_by_hand():
     assert sharpened(odds, 1.0) is odds
 
 
+def test_sharpened_where_a_float_is_too_coarse():
+    """0.4 ** 900 is 0 in floating point; (0.35 / 0.4) ** 900 is 6e-53."""
+    odds = at_places(lambda teams, known: np.array([[[0.25, 0.35, 0.4]]]))
+    sharp = sharpened(odds, 900.0)(np.array([[OPEN]]), np.array([0]))[0, 0]
+    np.testing.assert_allclose(sharp, [0.625**900, 0.875**900, 1.0], rtol=1e-9)
+    teams = filled(sharpened(odds, 900.0), np.full((20, 1), OPEN), np.zeros(20, np.int64), np.random.default_rng(0))
+    assert (teams == 2).all()
+
+
 def test_noise_comes_before_the_rules():
     doubt, allowed = np.array([1.0, 0.0, 0.0]), np.array([[True, True, False]])
     odds = proposal(at_places(lambda teams, known: np.array([[[0.0, 0.2, 0.8]]])), doubt, allowed)
