@@ -72,9 +72,8 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
     place = folder / EVALUATION
     look = Look(config, parts, run, place)
     with held(place), logging_to(place):
-        write_config(place, text)
         say(f"{folder} {far}")
-        manifest = Manifest.begun(place, run=str(folder), seed=config.seed, **of_tables(place))
+        manifest = Manifest.begun(place, run=str(folder), **of_tables(place))
         with manifest.until_the_end(again="The same command goes on from there."):
             tables, facts = look.all()
             for name in TABLES:
@@ -83,7 +82,8 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
                     write_table(path, COLUMNS[name], tables[name])
                 else:  # of an evaluation that had more to say
                     path.unlink(missing_ok=True)
-            manifest.add(epoch=run.epoch, evaluated=far, **facts)
+            write_config(place, text)
+            manifest.add(seed=config.seed, epoch=run.epoch, evaluated=far, **facts)
             for sheet in SHEETS:
                 forget(place / sheet)
     files = [f"{name}.csv" for name in TABLES if name in tables]
@@ -92,12 +92,12 @@ def evaluate(config: EvaluateConfig, text: str, out: Path | None) -> float:
 
 
 def of_tables(place: Path) -> dict[str, Any]:
-    """Returns which epoch the tables in ``place`` are of, as their manifest says; they stay until others are whole."""
+    """Returns what the manifest in ``place`` says of the tables there, which stay with it until others are whole."""
     try:
         told = read_manifest(place)
     except InputError:
         return {}
-    return {name: told[name] for name in ("epoch", "evaluated") if name in told}
+    return {name: told[name] for name in ("seed", "epoch", "evaluated", "teams", "rated", "reference") if name in told}
 
 
 @dataclass(frozen=True)

@@ -281,6 +281,26 @@ def test_a_run_that_was_broken_off_is_looked_at_as_far_as_it_got(berteam, tmp_pa
         assert (kept["epoch"], kept["status"], kept["rated"]) == (4, "done", 21)
 
 
+def test_until_it_ends_the_tables_stay_with_what_they_were_made_by(berteam, tmp_path, monkeypatch):
+    berteam("train", *LEARNERS, "selector=mcaa", "epochs=2", "out=run")
+    berteam("evaluate", "run", "seed=3")
+    place = tmp_path / "run" / "evaluation"
+    before, whole = json.loads((place / "manifest.json").read_text()), tables(place)
+    told = (place / "config.yaml").read_text()
+    with monkeypatch.context() as patch:
+        patch.setattr(Rps, "play", interrupting(Rps.play, 0))
+        berteam("evaluate", "run", "seed=4", "games_per_pair=2", "teams_at_most=3", "workers=1", code=130)
+    after = json.loads((place / "manifest.json").read_text())
+    assert after["status"] == "interrupted"
+    kept = ("seed", "epoch", "evaluated", "teams", "rated", "reference")
+    assert [after[name] for name in kept] == [before[name] for name in kept]
+    assert (place / "config.yaml").read_text() == told
+    assert tables(place) == whole
+    berteam("evaluate", "run", "seed=4", "games_per_pair=2", "teams_at_most=3")
+    assert json.loads((place / "manifest.json").read_text())["seed"] == 4
+    assert "games_per_pair: 2\n" in (place / "config.yaml").read_text()
+
+
 def test_games_of_three_sides_and_many_teams(berteam, tmp_path):
     berteam("train", *HANDS, "env.sides=3", "selector=mcaa", "epochs=2", "out=three")
     said = berteam("evaluate", "three").stdout

@@ -129,6 +129,22 @@ def test_teams_of_two_runs_and_fixed_ones(berteam, tmp_path):
     assert len(elo) > 4
 
 
+def test_a_cut_tournament_of_a_run_that_went_on_says_so(berteam, tmp_path, monkeypatch):
+    """It begins anew with the run as it stands then."""
+    berteam("train", "population=hands", "env=rps", "optimizer=fixed", "epochs=1", "out=r")
+
+    def interrupted(self, *words, **named):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Games, "play", interrupted)
+        berteam("tournament", "run=r", "out=t", code=130)
+    assert json.loads((tmp_path / "t" / "manifest.json").read_text())["epoch"] == 1
+    berteam("resume", "r", "epochs=3")
+    berteam("tournament", "run=r", "out=t", "on_exists=resume")
+    assert json.loads((tmp_path / "t" / "manifest.json").read_text())["epoch"] == 3
+
+
 def test_a_cut_tournament_goes_on(berteam, tmp_path, monkeypatch):
     """Interrupted after the first batch, it goes on with the second, to the same bytes; another config is refused."""
     words = (*HANDS, "games_per_pair=100", "action_noise=0.2")
