@@ -142,7 +142,9 @@ def called(configs: list[dict[str, Any]]) -> list[str]:
     for key in sorted(differing, key=prominence):
         if apart([*told, key]) > apart(told):
             told.append(key)
-    return [" ".join(f"{key.removesuffix('.name')}={x[key]}" for key in told if key in x) for x in configs]
+    words = {key: key.removesuffix(".name") for key in told}
+    nothing = " ".join(f"{word}=none" for word in words.values())  # of whoever lacks all that the others are told by
+    return [" ".join(f"{word}={x[key]}" for key, word in words.items() if key in x) or nothing for x in configs]
 
 
 def prominence(key: str) -> tuple[bool, int, str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from berteam_cli.report.drawing import SERIES, Plot, binned, drawn, over_epochs, panels, pooled, short
@@ -14,8 +16,8 @@ LEARNING = {
     "q_value": "value of actions taken",
 }
 SELECTOR = {
-    "loss": "loss (nat)",
-    "buffer": "teams remembered",
+    "loss": "loss",
+    "buffer": "remembered",
     "effective_teams": "effective teams",
     "exploitability": "exploitability",
 }
@@ -53,8 +55,10 @@ def learning(source: Source) -> Plot:
     for plot, column in zip(plots, there, strict=True):
         plot.set_title(LEARNING[column])
     over_epochs(plots[-1])
-    legend = dict(zip(*plots[0].get_legend_handles_labels()[::-1], strict=True))
-    figure.legend(legend.values(), legend.keys(), loc="outside lower left", ncols=4)
+    legend: dict[str, Any] = {}  # not every algorithm is in every panel
+    for plot in plots:
+        legend |= dict(zip(*plot.get_legend_handles_labels()[::-1], strict=True))
+    figure.legend(list(legend.values()), list(legend), loc="outside lower left", ncols=4)
     says = (
         "Means over the members that learnt in an epoch, by algorithm. Losses of different algorithms are different "
         "quantities, and a smaller loss is no stronger player." + pooled(table.epoch.nunique())
@@ -79,7 +83,8 @@ def selecting(source: Source) -> Plot:
     over_epochs(plots[-1])
     says = (
         "Effective teams: as spread out as equal chances for so many. Exploitability: what the best answer wins on "
-        "average. A buffer that stays empty means there were no winners to learn from." + pooled(len(table))
+        "average. What the loss is and what is remembered depends on the selector (docs/selectors.md); some remember "
+        "nothing." + pooled(max(int(table[x].notna().sum()) for x in there))
     )
     ends = ", ".join(f"{SELECTOR[x]} {table[x].dropna().iloc[-1]:.4g}" for x in there)
     return drawn(figure, name, title, says, f"Curves over the epochs; at the end {ends}.")

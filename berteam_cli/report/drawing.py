@@ -176,4 +176,4 @@ def binned(x: Floats, values: Floats, most: int = POINTS) -> tuple[Floats, Float
 def pooled(epochs: int) -> str:
     """Returns what is said where curves of ``epochs`` points were pooled, nothing where they were not."""
     size = -(-epochs // POINTS)
-    return "" if size == 1 else f" Each point is the mean of {size} neighbouring ones."
+    return "" if size == 1 else f" Each point is the mean of up to {size} neighbouring ones."

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from berteam_cli.errors import InputError, RunError
-from berteam_cli.outcomes import Floats
+from berteam_cli.outcomes import Floats, Ints
 from berteam_cli.report.drawing import LIGHT, SERIES, Plot, drawn, kept, over_epochs, panels, short
 from berteam_cli.report.source import Source
 
@@ -63,6 +63,7 @@ def fitness(source: Source) -> Plot:
     table = source.agents
     if table is None:
         return Plot(name, title, "There is no agents.csv: berteam train writes it.")
+    table = table[~table.island.isin(source.exploiters)]  # who are not rated: their fitness stays where it began
     wide = table.pivot_table(index="epoch", columns="agent", values="fitness")
     wide = wide.iloc[kept(len(wide), ON_A_LINE)]
     figure, (plot,) = panels()
@@ -96,10 +97,12 @@ def embeddings(source: Source) -> Plot:
     found = vectors(source)
     if isinstance(found, str):
         return Plot(name, title, found)
-    flat, shares = plane(found)
+    members, values = found
+    flat, shares = plane(values)
     last = None if source.agents is None else source.agents[source.agents.epoch == source.agents.epoch.max()]
-    island = ["members"] * len(flat) if last is None or len(last) != len(flat) else list(last.island.astype(str))
-    manner = manners(source, len(flat))
+    island = ["members"] * len(flat) if last is None else told(last, "island", members)
+    manners = source.evaluated("members")
+    manner = [""] * len(flat) if manners is None else told(manners, "group", members)
     both = [f"{home}, {way}" if way else home for home, way in zip(island, manner, strict=True)]
     homes, ways = list(dict.fromkeys(island)), list(dict.fromkeys(manner))
     figure, (plot,) = panels(height_in=4.2)
@@ -111,29 +114,27 @@ def embeddings(source: Source) -> Plot:
         plot.plot(x, y, marker, color=color, markersize=6, label=short(group, 34), markeredgecolor=LIGHT["card"])
     for agent in range(len(flat)) if len(flat) <= LINES else ():
         at = (flat[agent, 0], flat[agent, 1])
-        plot.annotate(str(agent), at, (4, 3), textcoords="offset points", fontsize=7, color=LIGHT["pale"])
+        plot.annotate(str(members[agent]), at, (4, 3), textcoords="offset points", fontsize=7, color=LIGHT["pale"])
     plot.set(xlabel=f"first component ({shares[0]:.0%} of variance)", ylabel=f"second ({shares[1]:.0%})")
     figure.legend(loc="outside lower left", ncols=4)
     says = (
-        f"The {found.shape[1]} numbers that stand for each member, in the two directions in which they differ most "
+        f"The {values.shape[1]} numbers that stand for each member, in the two directions in which they differ most "
         f"({shares.sum():.0%} of the variance). Nearness here is not a proof: distances in the other directions are "
         "not shown; evaluation/embeddings.csv has the cosines in all of them."
     )
     return drawn(figure, name, title, says, f"Map of {len(flat)} members by island.")
 
 
-def manners(source: Source, members: int) -> list[str]:
-    """Returns whether each of so many members is aggressive or defensive, nothing where that was not measured."""
-    table = source.evaluated("members")
-    if table is None or len(table) != members:
-        return [""] * members
-    return list(table.sort_values("agent").group.fillna("").astype(str))
+def told(table: pd.DataFrame, column: str, members: Ints) -> list[str]:
+    """Returns what ``table`` says of each of the ``members`` in ``column``, nothing where it does not."""
+    return list(table.set_index("agent")[column].reindex(members).fillna("").astype(str))
 
 
-def vectors(source: Source) -> Floats | str:
-    """Returns the (N, width) vectors of the members, or why there are none."""
-    from berteam_cli.reading import last_state  # noqa: PLC0415 (torch is not needed for tables)
-    from berteam_cli.selector.embeddings import Embedding  # noqa: PLC0415
+def vectors(source: Source) -> tuple[Ints, Floats] | str:
+    """Returns (K,) the members that are rated and their (K, width) vectors, or why there are none."""
+    from berteam_cli.population import rated  # noqa: PLC0415 (torch is not needed for tables)
+    from berteam_cli.reading import last_state  # noqa: PLC0415 (as above)
+    from berteam_cli.selector.embeddings import Embedding  # noqa: PLC0415 (as above)
 
     if not (source.folder / "checkpoint").exists():
         return "There is no checkpoint to read the selector from: berteam train writes it."
@@ -143,8 +144,8 @@ def vectors(source: Source) -> Floats | str:
         return f"The selector cannot be read: {error}"
     if not isinstance(parts.selector, Embedding):
         return "This selector has no vectors of members; selector=berteam has."
-    found = parts.selector.embeddings(run.selection)
-    return found if len(found) > 2 else "Two members are no map."
+    members = np.flatnonzero(rated(parts.optimizer.islands))
+    return (members, parts.selector.embeddings(run.selection)[members]) if len(members) > 2 else "Two are no map."
 
 
 def plane(values: Floats) -> tuple[Floats, Floats]:

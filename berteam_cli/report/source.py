@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from omegaconf import OmegaConf
 
 from berteam_cli.command.inspect import read_table
+from berteam_cli.errors import InputError
 from berteam_cli.folder import CONFIG, evaluated_at, newest, read_manifest
 from berteam_cli.records import COLUMNS, EVALUATION
 
@@ -105,6 +108,15 @@ class Source:
             return {}
         last = self.agents[self.agents.epoch == self.agents.epoch.max()]
         return dict(zip(last.agent, last["name"].astype(str), strict=True))
+
+    @cached_property
+    def exploiters(self) -> list[str]:
+        """Islands whose members are never chosen for teams, and so never rated; none where no config tells."""
+        from berteam_cli.stored import plain_config  # noqa: PLC0415 (it brings torch, which tables do not need)
+
+        with suppress(InputError):
+            return list(OmegaConf.select(plain_config(self.folder), "opponents.exploiters") or [])
+        return []
 
     @cached_property
     def config(self) -> str | None:

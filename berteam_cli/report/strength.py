@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from berteam_cli.report.drawing import SERIES, Plot, drawn, kept, panels, short
 from berteam_cli.report.source import Source
@@ -78,15 +77,14 @@ def against_probability(source: Source) -> Plot:
 
 
 def crosstable(source: Source) -> Plot:
-    """Returns the mean scores of teams against each other."""
+    """Returns the mean scores of teams against each other, as crosstable.csv has them."""
     name, title = "crosstable", "Who beats whom"
-    pairs = source.table("pairs")
-    if pairs is None:
+    table = source.table("crosstable")
+    if table is None:
         says = "The teams have not all played each other: `berteam tournament run=RUN top=20` has its best ones do so."
         return Plot(name, title, f"{says} Report the tournament's folder then.")
-    scores = mean_scores(pairs)
-    order = [] if source.elo is None else [team for team in source.elo.team if team in scores.index]
-    order = (order or list(scores.mean(axis=1).sort_values(ascending=False).index))[:CELLS]
+    scores = table.set_index("team")
+    order = list(scores.index[:CELLS])
     cells = scores.reindex(index=order, columns=order).to_numpy(float)
     figure, (plot,) = panels(height_in=2.0 + 0.14 * len(order))
     drawn_cells = plot.pcolormesh(np.ma.masked_invalid(cells), cmap="PuOr", vmin=0, vmax=1, rasterized=False)
@@ -95,15 +93,9 @@ def crosstable(source: Source) -> Plot:
     plot.set_yticks(ticks, [short(x, 14) for x in order])
     plot.set(xlabel="opponent", ylabel="team, the strongest on top", ylim=(len(order), 0), aspect="equal")
     plot.grid(visible=False)
-    figure.colorbar(drawn_cells, ax=plot, label="mean score (1 win, 0.5 draw, 0 loss)", shrink=0.8)
+    figure.colorbar(drawn_cells, ax=plot, label="mean score (1 win, 0 loss)", shrink=0.8)
     says = (
-        "Mean score of the team in the row against the one in the column, over both sides. Games of players without "
+        "Mean score of the team in the row against the one in the column, over all sides. Games of players without "
         "chance are copies of each other, so a full cell may rest on few different games."
     )
     return drawn(figure, name, title, says, f"Heat map of mean scores among {len(order)} teams.")
-
-
-def mean_scores(pairs: pd.DataFrame) -> pd.DataFrame:
-    """Returns the mean score of each team (rows) against each other (columns), sides together."""
-    summed = pairs.groupby(["team", "opponent"])[["games", "wins", "draws"]].sum()
-    return ((summed.wins + 0.5 * summed.draws) / summed.games).unstack()

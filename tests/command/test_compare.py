@@ -137,3 +137,6 @@ def test_algorithms_are_called_by_what_tells_them_apart():
     rates = [config("mcaa", "fixed", epochs=5, **{"selector.rate": x}) for x in (0.1, 0.2)]
     assert called(rates) == ["selector.rate=0.1", "selector.rate=0.2"]
     assert called(rates[:1]) == ["all"]
+    main, extra = ({f"population.islands.{x}.learner.name": y} for x, y in (("main", "ppo"), ("extra", "dqn")))
+    told = "population.islands.extra.learner"
+    assert called([main, main | extra]) == [f"{told}=none", f"{told}=dqn"]  # and no name is empty

@@ -1,13 +1,14 @@
 import re
 
 import numpy as np
-import pandas as pd
 import pytest
+from matplotlib.axes import Axes
 
 from berteam_cli.report.drawing import POINTS, SERIES, binned, drawn, kept, panels, short, styled
 from berteam_cli.report.members import plane
 from berteam_cli.report.page import spoken
-from berteam_cli.report.strength import mean_scores
+from berteam_cli.report.source import Source
+from berteam_cli.report.strength import crosstable
 
 
 def test_few_points_stay_as_they_are():
@@ -42,12 +43,19 @@ def test_principal_components():
     np.testing.assert_allclose(plane(values + 7)[0], flat, atol=1e-9)
 
 
-def test_mean_scores_join_both_sides():
-    rows = [("a", "b", 2, 1, 1, 0), ("a", "b", 2, 0, 1, 1), ("b", "a", 4, 1, 2, 1)]
-    scores = mean_scores(pd.DataFrame(rows, columns=["team", "opponent", "games", "wins", "draws", "losses"]))
-    assert scores.loc["a", "b"] == 0.5  # a win, two draws and a loss
-    assert scores.loc["b", "a"] == 0.5
-    assert np.isnan(scores.loc["a", "a"])
+def test_who_beats_whom_is_what_the_crosstable_says(tmp_path, monkeypatch):
+    """Of three sides, where a pair's wins and draws would not tell."""
+    (tmp_path / "crosstable.csv").write_text("team,1,0\n1,,0.8333\n0,0.1667,\n")
+    shown, mesh = [], Axes.pcolormesh
+
+    def noted(plot, *cells, **how):
+        shown.append(cells[-1])
+        return mesh(plot, *cells, **how)
+
+    monkeypatch.setattr(Axes, "pcolormesh", noted)
+    with styled():
+        assert crosstable(Source(tmp_path, {"status": "done"})).alt == "Heat map of mean scores among 2 teams."
+    np.testing.assert_array_equal(shown[0].filled(-1), [[-1, 0.8333], [0.1667, -1]])
 
 
 def test_a_drawing_follows_the_page_and_shares_no_identifier():
