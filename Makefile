@@ -69,7 +69,7 @@ picture: setup ## the pictures of the README and docs
 SMALL := outputs/results_small
 BOTH := hydra/launcher=joblib hydra.launcher.n_jobs=2
 
-results: setup ## docs/results.md, small: five levers, three seeds, and selectors on the same members, in some twenty minutes
+results: setup ## docs/results.md, small: four levers, three seeds, and selectors on the same members, in some twenty minutes
 	$(BIN)/berteam sweep docs/results/small.yaml $(BOTH) hydra.sweep.dir=$(SMALL)/levers
 	$(BIN)/berteam sweep docs/results/selection.yaml $(BOTH) hydra.sweep.dir=$(SMALL)/selection epochs=100 evaluation.games=2800 evaluation.games_per_pair=10 population.run=$(SMALL)/levers/0,$(SMALL)/levers/1,$(SMALL)/levers/2
 	$(BIN)/python docs/results/tables.py $(SMALL)/levers
