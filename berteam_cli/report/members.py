@@ -127,7 +127,7 @@ def embeddings(source: Source) -> Plot:
 
 def told(table: pd.DataFrame, column: str, members: Ints) -> list[str]:
     """Returns what ``table`` says of each of the ``members`` in ``column``, nothing where it does not."""
-    return list(table.set_index("agent")[column].reindex(members).fillna("").astype(str))
+    return list(table.drop_duplicates("agent").set_index("agent")[column].reindex(members).fillna("").astype(str))
 
 
 def vectors(source: Source) -> tuple[Ints, Floats] | str:

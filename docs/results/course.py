@@ -90,7 +90,11 @@ def draw(picture: Path) -> None:
             points, label = smoothed(choice, course.games_per_epoch), None if seed else course.label
             left.plot(points.games, points.elo, color=course.color, label=label)
             right.plot(points.games, points.won, color=course.color)
-    strengths = ((BEST_PAIR, "best scripted pair"), (NO_WIN_NO_LOSS, "all games drawn"), (PAPER, "the paper, whole"))
+    strengths = (
+        (BEST_PAIR, "best scripted pair"),
+        (NO_WIN_NO_LOSS, "all games drawn"),
+        (PAPER, "the paper, whole (on its scale)"),
+    )
     for elo, said in strengths:
         left.axhline(elo, color="0.6", linestyle=":", linewidth=1)
         left.text(

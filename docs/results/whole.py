@@ -126,10 +126,32 @@ def courses(looks: pd.DataFrame, games: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def coevolution(looks: pd.DataFrame, games: pd.DataFrame) -> pd.DataFrame:
+    """Returns the table of how the runs of one variant went, a row for each span, its seeds side by side."""
+    rows = []
+    for seed, of_run in looks.groupby("seed"):
+        choice = of_choice(of_run).loc[1:]
+        since = choice.groupby(spans(choice.index))
+        own = games[games.seed == seed].set_index("to_epoch")
+        cells = {
+            "expected Elo of the choice": since.elo.mean().map("{:.0f}".format),
+            "won": since.wins.sum().map("{:,}".format),
+            "lost": since.losses.sum().map("{:,}".format),
+            "own games decided": (own.decided / own.games).map("{:.4f}".format),
+            "grabs in an own game": (own.grabs / own.games).map("{:.3f}".format),
+        }
+        rows.append(pd.DataFrame(cells))
+    joined = pd.concat(rows).groupby(level=0).agg("; ".join)
+    joined.insert(0, "to epoch", [f"{epoch:,}" for epoch in joined.index])
+    return joined
+
+
 def shown(*tables: pd.DataFrame) -> str:
-    """Returns the page's tables of the comparison; ``tables`` are those of runs, looks and games."""
+    """Returns the page's tables; ``tables`` are those of runs, looks and games."""
+    _, *of_coevolution = (table[table.variant.str.contains("paper_coevolution")] for table in tables)
     runs, looks, games = (table[table.variant.str.contains("paper_comparison")] for table in tables)
-    return f"{markdown(ends(runs, games))}\n\n{markdown(courses(looks, games))}"
+    found = coevolution(*of_coevolution), ends(runs, games), courses(looks, games)
+    return "\n\n".join(map(markdown, found))
 
 
 if __name__ == "__main__":

@@ -302,6 +302,28 @@ def test_who_was_replaced_is_counted(scripts, tmp_path):
     assert [row[f"rated_{x}"] for x in ("games", "wins", "draws", "losses")] == [10, 3, 3, 4]
 
 
+def test_seeds_of_the_coevolution_stand_side_by_side(scripts, monkeypatch):
+    monkeypatch.setattr(scripts.whole, "SPAN", 10)
+    look = {"opponent": "all", "who": "choice"}
+    looks = pd.DataFrame(
+        [
+            look | {"seed": seed, "epoch": epoch, "elo": 900 + epoch + seed, "wins": epoch, "losses": 1000 * seed}
+            for seed, epochs in ((0, (0, 5, 10, 15)), (1, (0, 5, 10)))
+            for epoch in epochs
+        ]
+    )
+    games = pd.DataFrame({"seed": [0, 0, 1], "to_epoch": [10, 20, 10], "games": 8, "decided": [2, 0, 4], "grabs": 4})
+    table = scripts.whole.coevolution(looks, games)
+    assert table.to_dict("list") == {
+        "to epoch": ["10", "20"],
+        "expected Elo of the choice": ["908; 908", "915"],
+        "won": ["15; 15", "15"],
+        "lost": ["0; 2,000", "0"],
+        "own games decided": ["0.2500; 0.5000", "0.0000"],
+        "grabs in an own game": ["0.500; 0.500", "0.500"],
+    }
+
+
 def test_the_page_shows_the_whole_runs_that_are_shipped(scripts):
     runs, looks, games = (pd.read_csv(RESULTS / file) for file in scripts.whole.TABLES.values())
     page = (ROOT / "docs" / "results.md").read_text().splitlines()
