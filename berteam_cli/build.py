@@ -16,7 +16,7 @@ from berteam_cli.config_commands import RAY, CommandConfig, TrainConfig
 from berteam_cli.config_env import CurriculumConfig, EnvConfig
 from berteam_cli.config_groups import OptimizerConfig
 from berteam_cli.curriculum import Curriculum, Practising
-from berteam_cli.env.base import Env, blank_trajectories
+from berteam_cli.env.base import Env, blank_trajectories, trajectory_bytes
 from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.env.rps import Rps
@@ -25,7 +25,7 @@ from berteam_cli.evolving import breeding, niches
 from berteam_cli.founding import check_policies
 from berteam_cli.frozen import everybody
 from berteam_cli.games import Games
-from berteam_cli.memory import check_memory
+from berteam_cli.memory import Room, check_memory
 from berteam_cli.opponents.none import Nobody
 from berteam_cli.opposing import opponents as opposing
 from berteam_cli.opposing import without_exploiters
@@ -138,8 +138,12 @@ def parts(config: TrainConfig, *, stored: Path | None = None, read_only: bool = 
     games_kept = own // rounds(selecting) + others.games if watched and not read_only else 0
     if not read_only:
         # Both halves of an epoch of answers, and all of it in one piece.
-        room = 4 * games_kept if selecting.answers else games_kept
-        check_memory(islands, playing.env, room, config.games_per_epoch)
+        played = trajectory_bytes(playing.env, 4 * games_kept if selecting.answers else games_kept)
+        rooms = [Room(played, "games_per_epoch", config.games_per_epoch)]
+        if selecting.observes:
+            settings: Any = config.selector  # of one that remembers
+            rooms.append(Room(selecting.seen_bytes, "selector.capacity", settings.capacity))
+        check_memory(islands, rooms)
     return Parts(
         seed=config.seed,
         games_per_epoch=config.games_per_epoch,

@@ -7,17 +7,30 @@ import resource
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 
-from berteam_cli.env.base import Env, trajectory_bytes
 from berteam_cli.errors import InputError
 from berteam_cli.population import Island
 
 BASE = 3 * 2**28  # bytes of the interpreter with torch, and of BERTeam's network
 COPIES = 2  # a checkpoint holds what it writes a second time, and so does a run that goes on until it has read it
 GROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+
+
+class Room(NamedTuple):
+    """Memory that a setting asks for, in proportion to its value.
+
+    Attributes:
+        taken: bytes.
+        key: of the setting.
+        value: of it.
+    """
+
+    taken: int
+    key: str
+    value: int
 
 
 def available() -> int:
@@ -42,14 +55,12 @@ def state_bytes(island: Island) -> int:
     return island.learner.state_bytes(island.size)
 
 
-def check_memory(islands: tuple[Island, ...], env: Env, games: int, games_per_epoch: int) -> None:
+def check_memory(islands: tuple[Island, ...], rooms: list[Room]) -> None:
     """Checks that what a run keeps in memory fits there, that of each device on it.
 
     Args:
         islands: of the population.
-        env: the game.
-        games: room for so many is needed.
-        games_per_epoch: the setting that says how many.
+        rooms: what is kept beside its members, on the processor's side.
 
     Raises:
         InputError: it does not; with the setting that takes most and the largest value that would fit.
@@ -58,19 +69,18 @@ def check_memory(islands: tuple[Island, ...], env: Env, games: int, games_per_ep
         there = [island for island in islands if getattr(island.learner, "device", "cpu") == device]
         if device == "cpu":
             whole = available()
-            fits_there(there, trajectory_bytes(env, games), games_per_epoch, (whole - BASE) // COPIES, whole)
+            fits_there(there, rooms, (whole - BASE) // COPIES, whole)
         elif there:
             free, whole = torch.cuda.mem_get_info()
-            fits_there(there, 0, games_per_epoch, free, whole)
+            fits_there(there, [], free, whole)
 
 
-def fits_there(islands: list[Island], played: int, games: int, limit: int, whole: int) -> None:
-    """Checks that members and the trajectories of an epoch, of ``played`` bytes, take at most ``limit`` bytes.
+def fits_there(islands: list[Island], rooms: list[Room], limit: int, whole: int) -> None:
+    """Checks that members and ``rooms`` take at most ``limit`` bytes.
 
     Args:
         islands: the members.
-        played: bytes, in proportion to ``games``.
-        games: of one epoch.
+        rooms: what is kept beside them.
         limit: bytes.
         whole: bytes that there are, for the message.
 
@@ -78,15 +88,15 @@ def fits_there(islands: list[Island], played: int, games: int, limit: int, whole
         InputError: they take more.
     """
     members = sum(state_bytes(island) for island in islands)
-    total = members + played
+    total = members + sum(room.taken for room in rooms)
     if total <= limit:
         return
-    said = f"members and games would take {spoken(total)} of memory, and may take {spoken(limit)} of {spoken(whole)}"
-    largest = max(islands, key=state_bytes, default=None)
-    takes = state_bytes(largest) if largest else 0
-    if largest is None or played > takes:
-        most = max((limit - members) * games // played, 0)
-        raise InputError(f"games_per_epoch must be <= {most}, but is {games}: {said}.")
+    said = f"what is kept would take {spoken(total)} of memory, and may take {spoken(limit)} of {spoken(whole)}"
+    largest, room = max(islands, key=state_bytes, default=None), max(rooms, default=Room(0, "", 0))
+    if largest is None or room.taken > state_bytes(largest):
+        most = max((limit - (total - room.taken)) * room.value // room.taken, 0)
+        raise InputError(f"{room.key} must be <= {most}, but is {room.value}: {said}.")
+    takes = state_bytes(largest)
     learner: Any = largest.learner  # of whatever kind, a frozen dataclass
     key, most = learner.buffer, 0
     if key:

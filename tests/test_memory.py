@@ -75,6 +75,30 @@ def test_as_many_games_as_are_said_to_fit_do(more, monkeypatch):
         made(fits + 10)
 
 
+@pytest.mark.parametrize("rings", ["shared", "per_side"])
+def test_what_winners_saw_is_counted(rings, monkeypatch):
+    words = [
+        "population=fixed_policies",
+        "optimizer=fixed",
+        "selector.observations.use=self",
+        f"selector.dataset={rings}",
+    ]
+
+    def made(capacity):
+        return build.parts(checked(composed(*words, f"selector.capacity={capacity}")))
+
+    chooses = made(50).selector
+    held = chooses.init(np.random.default_rng(0)).winners
+    assert chooses.seen_bytes == sum(ring.held.rows.nbytes for ring in held)
+    monkeypatch.setattr(memory, "available", lambda: 2 * 2**30)
+    with pytest.raises(InputError, match=r"selector.capacity must be <= \d+, but is 1000000: ") as refused:
+        made(10**6)
+    fits = int(str(refused.value).split("<= ")[1].split(",")[0])
+    made(fits)
+    with pytest.raises(InputError):
+        made(fits + 1)
+
+
 def test_what_a_process_is_limited_to_counts():
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     whole = memory.available()

@@ -71,7 +71,9 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         played = sum(column.nbytes for column in parts.room or ())
         for remark in (*parts.selector.remarks(), *discounts(parts.optimizer, parts.games.env)):
             log.info("%s", remark)
-        log.info("Memory: %s of members' weights and buffers, %s of an epoch's games.", spoken(state), spoken(played))
+        seen_by = f", {spoken(parts.selector.seen_bytes)} of what winners saw" if parts.selector.observes else ""
+        words = "Memory: %s of members' weights and buffers, %s of an epoch's games%s."
+        log.info(words, spoken(state), spoken(played), seen_by)
         if against := parts.opponents.remarks():
             log.info("Trained against %s, beside teams of the population.", "; ".join(against))
         if saved:

@@ -113,6 +113,11 @@ class Plain:
         return False
 
     @property
+    def seen_bytes(self) -> int:
+        """Returns 0: it remembers nothing of what players saw."""
+        return 0
+
+    @property
     def answers(self) -> bool:
         """Returns False: it chooses each team by itself."""
         return False
@@ -141,6 +146,10 @@ class Selector(Protocol[S]):
     @property
     def observes(self) -> bool:
         """Whether ``learn`` wants to know what the players saw."""
+
+    @property
+    def seen_bytes(self) -> int:
+        """Bytes that it takes to remember what they saw."""
 
     @property
     def answers(self) -> bool:

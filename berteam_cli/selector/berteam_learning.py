@@ -121,6 +121,17 @@ class BerteamLearning(Plain):
         return self.observations.use != "none"
 
     @property
+    def seen_bytes(self) -> int:
+        """Bytes that it takes to remember what they saw."""
+        looking = self.observations
+        numbers = self.field.team_size * looking.rows * looking.numbers
+        return np.dtype(np.float16).itemsize * self._rings * self.capacity * numbers
+
+    @property
+    def _rings(self) -> int:
+        return self.field.sides if self.dataset == "per_side" else 1
+
+    @property
     def answers(self) -> bool:
         """Whether it chooses teams for a second game on what was seen in the first."""
         return self.observations.use == "previous_game"
@@ -134,12 +145,11 @@ class BerteamLearning(Plain):
         """Returns random weights and no winners."""
         field, looking = self.field, self.observations
         networks = field.sides if self.side == "separate" else 1
-        rings = field.sides if self.dataset == "per_side" else 1
         device = torch.device(self.device)
         return BerteamState(
             tuple(untrained(self._built(rng), device) for _ in range(networks)),
             tuple(
-                no_winners(self.capacity, field.team_size, looking.rows, looking.numbers) for _ in range(rings)
+                no_winners(self.capacity, field.team_size, looking.rows, looking.numbers) for _ in range(self._rings)
             ),  # a memory of its own for each: a checkpoint takes no tensor twice
             0,
         )

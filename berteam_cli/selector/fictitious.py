@@ -88,6 +88,11 @@ class Fictitious:
         return self.responder.observes
 
     @property
+    def seen_bytes(self) -> int:
+        """Bytes that it takes to remember what they saw."""
+        return self.responder.seen_bytes
+
+    @property
     def answers(self) -> bool:
         """Whether it chooses teams for a second game on what was seen in the first."""
         return self.responder.answers

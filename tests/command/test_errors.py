@@ -76,7 +76,7 @@ CASES = {
         "learner.gradient_steps=0",
     ): "learner.gradient_steps must be >= 1, or -1",
     ("train", "population=ppo6", "learner=dqn", "learner.buffer_size=900000000"): "main.learner.buffer_size must be <= "
-    r"\d+, but is 900000000: members and games would take .* GiB of memory",
+    r"\d+, but is 900000000: what is kept would take .* GiB of memory",
     ("train", "population=ppo6", "learner.n_steps=640000000"): "main.learner.n_steps must be <= ",
     ("train", "population=ppo6", "games_per_epoch=90000000"): "games_per_epoch must be <= ",
     ("train", "population=ppo6", "population.islands.main.size=100000", "learner.network=[2048,2048]"): "too many m",
