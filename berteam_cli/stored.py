@@ -148,7 +148,8 @@ def as_begun(config: DictConfig) -> DictConfig:
     """
     folder: Any = Path(config.out) if config.out else None
     given: Any = config  # its keys are those of a TrainConfig
-    if not goes_on(given, folder) or not OmegaConf.is_interpolation(config.optimizer, "protect_new"):
+    replacing = "protect_new" in config.optimizer and OmegaConf.is_interpolation(config.optimizer, "protect_new")
+    if not goes_on(given, folder) or not replacing:
         return config
     begun = OmegaConf.select(plain_config(folder), "optimizer.protect_new")
     if not isinstance(begun, int):

@@ -22,7 +22,8 @@ class Ended(NamedTuple):
     Attributes:
         lanes: (K,) where they were played.
         games: (K,) their numbers.
-        ends: (K,) as of ``kernel.finished``; TIME_OUT is a truncation, all others are terminations.
+        ends: (K,) as of ``kernel.finished``; TIME_OUT is a truncation unless the reward pays the result
+            (``rewards.Reward.ends_on_time``), all others are terminations.
         steps: (K,) how many they took.
         score: (K, 2, 3) captures, tags, grabs of blue and of red.
         events: (K, V, 11) columns as in ``state.EVENTS``.

@@ -296,6 +296,9 @@ def test_what_is_a_share_of_the_epochs_stays_as_it_began(berteam, tmp_path):
     for name in UNTIMED:
         assert (tmp_path / "one" / f"{name}.csv").read_bytes() == (tmp_path / "other" / f"{name}.csv").read_bytes()
     assert "protect_new: 2\n" in (tmp_path / "one" / "config.yaml").read_text()
+    fixed = [*words, "optimizer=fixed", "out=fixed"]  # which replaces nobody
+    berteam(*fixed, "epochs=2")
+    berteam(*fixed, "epochs=3", "on_exists=resume")
     said = berteam(*words, "epochs=32", "optimizer.protect_new=3", "out=one", "on_exists=resume", code=2).stderr
     assert "optimizer.protect_new is 3, but the run in one was begun with 2" in said
 

@@ -18,7 +18,7 @@ CONTRADICTIONS: dict[tuple[str, ...], str] = {
     ("train", "env=rps", "env.sides=9"): "env.sides must be >= 2 and <= 8",
     ("train", "logger=csv", "logger.project=x"): "logger.project is no key",
     ("train", "population=hands"): "population|policies",
-    ("train", "team_size=61", "population=ppo6"): "team_size must be at most 6",
+    ("train", "team_size=7", "population=ppo6"): "team_size must be at most 6",
     ("train", "team_size=50", "population=ppo50"): "env.team_size must be at most 49, so that nobody starts",
     (*RPS, "learner=fixed"): "learner.policies must name 6 of rock, paper, scissors, one for each member, but is empty",
     (*RPS, "learner=fixed", "learner.policies=[rock]"): "main.size must be 1, as learner.policies names so many",
