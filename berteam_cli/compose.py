@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -106,7 +107,7 @@ def check_sweep_folder(overrides: list[Override]) -> None:
             if (folder / JOBS).exists() or (folder.is_dir() and any((x / MANIFEST).exists() for x in folder.iterdir())):
                 raise InputError(
                     f"hydra.sweep.dir={folder} holds a sweep already; choose another folder, "
-                    f"or go on with it: berteam sweep --resume {folder}"
+                    f"or go on with it: berteam sweep --resume {shlex.quote(str(folder))}"
                 )
 
 

@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import platform
+import shlex
 import shutil
 import sys
 import traceback
@@ -172,7 +173,7 @@ class Manifest:
             if again:
                 return again
             if resumable and newest(self.folder) >= 0:
-                return f"Go on with: berteam resume {self.folder}"
+                return f"Go on with: berteam resume {shlex.quote(str(self.folder))}"
             return "Begin anew with on_exists=overwrite."
 
         try:

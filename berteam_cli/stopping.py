@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 
 log = logging.getLogger("berteam")
@@ -21,19 +22,35 @@ class Stop:
     Attributes:
         asked: somebody did.
         in_epoch: an epoch is under way: its half must not be saved, so the run ends after it.
+        file: whoever makes or touches it asks, too, from wherever the run may not hear of a signal; None for none.
+        touched: when that was done last before the run began, in ns; 0: it was not there.
     """
 
     asked: bool = False
     in_epoch: bool = False
+    file: Path | None = None
+    touched: int = 0
+
+    def wanted(self) -> bool:
+        """Returns whether the run is to end."""
+        return self.asked or when(self.file) not in (0, self.touched)
+
+
+def when(file: Path | None) -> int:
+    """Returns when ``file`` was touched last, in ns; 0 if it is not there."""
+    with suppress(OSError):
+        return file.stat().st_mtime_ns if file else 0
+    return 0
 
 
 @contextmanager
-def stoppable() -> Iterator[Stop]:
+def stoppable(file: Path | None = None) -> Iterator[Stop]:
     """Lets Ctrl-C, SIGTERM and SIGHUP end the run after its epoch, at once between epochs, and at once if repeated.
 
-    SIGHUP stays ignored where it is, as nohup has it: such a run outlives its terminal.
+    Whoever touches ``file`` from now on asks for its end after an epoch, too. SIGHUP stays ignored where it is, as
+    nohup has it: such a run outlives its terminal.
     """
-    stop = Stop()
+    stop = Stop(file=file, touched=when(file))
 
     def ask(number: int, frame: FrameType | None) -> None:
         if stop.asked or not stop.in_epoch:

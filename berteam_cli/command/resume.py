@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -59,9 +60,10 @@ def resume(folder: Path, overrides: list[str]) -> float:
         config: Any = OmegaConf.merge(stored, changes, {"on_exists": "resume", "out": str(folder)})
     except OmegaConfBaseException as error:
         raise InputError(one_line(error)) from error
+    job = Path(os.path.abspath(folder))  # whose sweep's folder has a name
     try:
-        with working(folder):
+        with working(job):
             return train(checked(config), OmegaConf.to_yaml(config), folder)
     finally:
-        if (folder.parent / JOBS).exists():
-            write_table(folder.parent)
+        if (job.parent / JOBS).exists():
+            write_table(job.parent)

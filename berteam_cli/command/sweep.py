@@ -14,9 +14,8 @@ from berteam_cli.errors import InputError, RunError
 from berteam_cli.overrides import arguments
 from berteam_cli.quiet import written
 from berteam_cli.sweep import plan
-from berteam_cli.sweep.folder import LOCKS, TABLE, Sweep, working
-from berteam_cli.sweep.job import STOP
-from berteam_cli.sweep.search import check_search, ends
+from berteam_cli.sweep.folder import LOCKS, STOP, TABLE, Sweep, working
+from berteam_cli.sweep.search import check_search, ends, words_of
 
 Check = Callable[[str, list[str]], object]
 """Checks the words of a command as Hydra would compose them; raises InputError."""
@@ -24,8 +23,8 @@ Launch = Callable[[str, list[str]], None]
 """Runs a multirun of a command with these words."""
 LAUNCHER = ("hydra/launcher=", "hydra.launcher.", "hydra.sweeper.max_batch_size=")
 """What is said of how a sweep runs."""
-NAMES_CODE = re.compile(r"trust|(reward|target)\W.*:")
-"""Words that may import code, or let a file run some."""
+NAMES_CODE = re.compile(r"trust|(reward|target)\W.*:|\$\{|logger\W.*(tracking|mode)")
+"""Words that may import code, let a file run some, stand for such words, or send figures elsewhere."""
 
 
 def asked(word: str, read: Callable[..., Any], check: Check, launch: Launch) -> None:
@@ -135,8 +134,8 @@ def resumed(folder: Path, words: list[str], check: Check, launch: Launch) -> Non
     sweep = Sweep.read(folder)
     if sweep.command not in plan.SWEPT:
         raise InputError.choice(f"{folder}: command", sweep.command, plan.SWEPT)
-    given = arguments(words).overrides
-    stored = {word for job in sweep.unfinished() for word in sweep.jobs[job]} | set(sweep.search.get("overrides", []))
+    given, again = arguments(words).overrides, ["berteam", "sweep", "--resume", str(folder)]
+    stored = {word for job in sweep.unfinished() for word in sweep.jobs[job]} | set(words_of(sweep.search))
     for word in given:
         if word not in stored and not word.startswith(LAUNCHER):
             raise InputError(
@@ -145,8 +144,8 @@ def resumed(folder: Path, words: list[str], check: Check, launch: Launch) -> Non
     for word in sorted(stored - set(given)):
         if plan.of_hydra(word) or NAMES_CODE.search(word):
             raise InputError(
-                f"A job of {folder} says {word}, which may run code, and what only lies in a folder never does; "
-                f"if it is yours, say it too: berteam sweep --resume {folder} {shlex.quote(word)}"
+                f"A job of {folder} says {word}, which may run code or send something elsewhere, and what only lies in "
+                f"a folder never does; if it is yours, say it too: {shlex.join([*again, *words, word])}"
             )
     words = [*plan.flags(words), *(word for word in given if word not in stored)]
     check(sweep.command, words)

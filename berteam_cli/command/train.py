@@ -32,6 +32,7 @@ from berteam_cli.recording import Recorder, also_growing
 from berteam_cli.records import Tables
 from berteam_cli.stopping import Stop, stoppable
 from berteam_cli.stored import check_same, checkpointed, goes_on, write_config
+from berteam_cli.sweep.folder import LOCKS, STOP
 from berteam_cli.training import Parts, Run, begin, epoch
 
 log = logging.getLogger("berteam")
@@ -84,7 +85,7 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         if origin := next((x.origin for x in parts.optimizer.islands if x.origin), None):
             manifest.add(members_of=f"{origin.run} after epoch {origin.epoch}")
             log.info("Members of %s after epoch %d, who learn nothing more.", origin.run, origin.epoch)
-        with manifest.until_the_end(), stoppable() as stop:
+        with manifest.until_the_end(), stoppable(folder.parent / LOCKS / STOP) as stop:
             told: Any = OmegaConf.to_container(OmegaConf.create(text))
             with logger(config.logger, folder, manifest.facts, told) as also:
                 run, recorder = trained(config, folder, parts, saved, started, stop, also)
@@ -151,7 +152,7 @@ def trained(
             also(run.epoch, figures_of(run, report, parts, state, sight))
             pace.tell(run.epoch, config.games_per_epoch)
             view.tell(run, len(report.replaced), distribution, sight)
-            asked = stop.asked  # later than this it ends after the next epoch
+            asked = stop.wanted()  # later than this it ends after the next epoch
             if asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
                 keep()
             stop.in_epoch = False

@@ -19,6 +19,7 @@ from berteam_cli.folder import MANIFEST, read_manifest
 from berteam_cli.records import COLUMNS, cell
 
 TABLE, JOBS, LOCKS = "sweep.csv", "sweep.json", ".locks"
+STOP = "stop"  # in LOCKS: running jobs end after their epoch, and no further one begins
 SCHEMA = 1
 WAIT_S = 5.0  # longer than anybody holds a lock who only looks whether it is held
 GLANCE_S = 0.05  # two who only look seldom hinder each other so long

@@ -11,10 +11,8 @@ from typing import Any
 
 from berteam_cli.errors import InputError, RunError, shown
 from berteam_cli.folder import ERROR, MANIFEST, Manifest
-from berteam_cli.sweep.folder import LOCKS, Sweep, with_job, working, write_table
+from berteam_cli.sweep.folder import LOCKS, STOP, Sweep, with_job, working, write_table
 from berteam_cli.workers import available_cores
-
-STOP = "stop"  # in LOCKS: no further job begins
 
 
 def swept(task: Callable[[], float], folder: Path, overrides: list[str], *, alone: bool) -> float:

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -17,9 +17,10 @@ from hydra.errors import HydraException
 from omegaconf.errors import OmegaConfBaseException
 
 from berteam_cli.compose import said
+from berteam_cli.errors import InputError
 from berteam_cli.folder import MANIFEST, Manifest
-from berteam_cli.sweep.folder import LOCKS, Sweep, write_table
-from berteam_cli.sweep.job import STOP, told
+from berteam_cli.sweep.folder import LOCKS, STOP, Sweep, working, write_table
+from berteam_cli.sweep.job import told
 from berteam_cli.sweep.process import HERE
 
 PRINTING = (HERE, "JoblibLauncher")  # their jobs' words reach the terminal
@@ -87,7 +88,10 @@ class Batch:
         except (HydraException, OmegaConfBaseException) as error:
             folder = self.sweep.folder / str(job)
             folder.mkdir(exist_ok=True)
-            Manifest.begun(folder, status="refused").add(overrides=self.sweep.jobs[job], error=said(error))
+            with suppress(InputError), working(folder):  # else whoever is at work there tells what becomes of it
+                begun = (folder / MANIFEST).exists()  # then it may still go on, with other words or another version
+                manifest = Manifest.of(folder) if begun else Manifest.begun(folder, status="refused")
+                manifest.add(overrides=self.sweep.jobs[job], error=said(error))
             print(told(job, self.sweep.jobs[job], said(error)), file=sys.stderr, flush=True)
             return False
         return True

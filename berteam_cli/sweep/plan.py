@@ -89,7 +89,7 @@ def planned(command: str, words: list[str]) -> tuple[list[str], Path, bool]:
 
 def of_hydra(word: str) -> bool:
     """Returns whether an override is one of Hydra's own settings."""
-    return word.lstrip("+~").startswith(("hydra.", "hydra/"))
+    return re.match(r"[+~]*hydra([./=@]|$)", word) is not None
 
 
 def flags(words: list[str]) -> list[str]:

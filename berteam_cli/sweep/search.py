@@ -18,6 +18,7 @@ from berteam_cli.sweep.plan import installed, spelt
 
 TRIALS = "optuna.log"
 BOUNDS = ("low", "high", "log", "step")
+ENDED = ("done", "failed", "refused")
 
 
 def check_search(path: Path, plan: Mapping[str, Any]) -> dict[str, Any]:
@@ -104,6 +105,25 @@ def ends(ranges: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def words_of(search: Mapping[str, Any]) -> list[str]:
+    """Returns the words of a search as a sweep's folder holds it, none of what is no search.
+
+    Raises:
+        InputError: its ranges are none.
+    """
+    try:
+        return [*map(str, search.get("overrides", [])), *ends(search.get("ranges", {}))]
+    except (TypeError, KeyError, AttributeError) as error:
+        raise InputError(f"sweep.json holds no search that can go on: {type(error).__name__} {error}.") from error
+
+
+def among(value: Any, asked: Any) -> bool:
+    """Returns whether a trial's ``value`` is one of what is ``asked``, however it came into the file of trials."""
+    if isinstance(asked, list):
+        return value in [spelt(choice) for choice in asked]
+    return isinstance(value, int | float) and asked["low"] <= value <= asked["high"]
+
+
 def search(sweep: Sweep, launch: Callable[[Sequence[int]], bool]) -> None:
     """Asks Optuna for values, runs their jobs and tells what came of them, until all trials are done.
 
@@ -134,7 +154,8 @@ def search(sweep: Sweep, launch: Callable[[Sequence[int]], bool]) -> None:
                 study.ask(space)
             continue
         for trial in under_way:
-            if trial.params.keys() == space.keys():
+            params, ranges = trial.params, asked["ranges"]
+            if params.keys() == space.keys() and all(among(params[key], ranges[key]) for key in ranges):
                 words = [f"{key}={value}" for key, value in trial.params.items()]
                 with_job(folder, sweep.command, trial.number, [*asked["overrides"], *words])
                 sweep.jobs[trial.number] = [*asked["overrides"], *words]
@@ -142,6 +163,8 @@ def search(sweep: Sweep, launch: Callable[[Sequence[int]], bool]) -> None:
                 study.tell(trial.number, state=TrialState.FAIL)
         numbers = [trial.number for trial in under_way if trial.number in sweep.jobs]
         if not launch([job for job in numbers if sweep.status(job)[0] != "done"]):
+            return
+        if any(sweep.status(job)[0] not in ENDED for job in numbers):  # its process died: the search goes on with it
             return
         elos = pd.read_csv(folder / TABLE, index_col="job").expected_elo
         for job in numbers:

@@ -6,6 +6,7 @@ A job whose process dies is told as failed, and the others go on.
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -38,14 +39,17 @@ class RayLauncher(Launcher):
         """Returns what each job returned, when all have ended."""
         import ray  # noqa: PLC0415 (an extra, and Hydra imports this file at every start)
 
+        from berteam_cli.cluster import own_handler  # noqa: PLC0415
+
         setup_globals()
         configure_log(self.config.hydra.hydra_logging, self.config.hydra.verbose)
         ours = not ray.is_initialized()
         if ours:
-            ray.init(**self.ray["init"])
+            with own_handler():
+                ray.init(**self.ray["init"])
         try:
             task = ray.remote(**self.ray["remote"])(one_job)
-            shared = ray.put((self.hydra_context, self.task_function, Singleton.get_state()))
+            shared = ray.put((self.hydra_context, self.task_function, Singleton.get_state(), os.getcwd()))
             tasks = []
             for number, overrides in enumerate(job_overrides, start=initial_job_idx):
                 log.info("\t#%d : %s", number, " ".join(filter_overrides(overrides)))
@@ -59,9 +63,11 @@ class RayLauncher(Launcher):
                 ray.shutdown()
 
 
-def one_job(shared: tuple[HydraContext, TaskFunction, Any], config: DictConfig) -> JobReturn:
-    """Runs one job, in a process of Ray's."""
-    context, task_function, singletons = shared
+def one_job(shared: tuple[HydraContext, TaskFunction, Any, str], config: DictConfig) -> JobReturn:
+    """Runs one job, in a process of Ray's; what it names without a root is where the command was given."""
+    context, task_function, singletons, place = shared
+    if os.path.isdir(place):
+        os.chdir(place)
     setup_globals()
     Singleton.set_state(singletons)
     HydraConfig.instance().set_config(config)

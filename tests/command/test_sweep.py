@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -14,7 +15,7 @@ import pytest
 import yaml
 
 from berteam_cli.folder import Manifest
-from berteam_cli.sweep.folder import Sweep, make_table, working
+from berteam_cli.sweep.folder import LOCKS, STOP, Sweep, make_table, working
 from berteam_cli.sweep.job import cores_each
 from berteam_cli.sweep.launching import beginning
 from berteam_cli.sweep.plan import NEEDS, spelt
@@ -233,6 +234,94 @@ def test_nothing_runs_that_only_lies_in_the_folder(berteam, tmp_path):
     assert "command must be one of" in berteam("sweep", "--resume", "sweep", code=2).stderr
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["+hydra={job_logging:{handlers:{x:{class:os.abort}}}}"],
+        ["out=os:abort", "env.reward=${out}"],
+        ["logger=mlflow", "logger.tracking=http://example.com"],
+        ["logger={name:wandb,mode:online}"],
+    ],
+)
+def test_no_way_round_is_left_to_what_only_lies_in_the_folder(berteam, tmp_path, words):
+    Sweep(tmp_path / "my sweep", "train", {0: [*RPS, "epochs=1", *words]}).keep()
+    said = berteam("sweep", "--resume", "my sweep", code=2).stderr
+    assert f"says {words[-1]}, which may run code or send something elsewhere" in said
+    assert f"berteam sweep --resume 'my sweep' {shlex.quote(words[-1])}" in said
+    assert not (tmp_path / "my sweep" / "0").exists()
+
+
+def test_neither_ranges_nor_trials_of_a_folder_bring_code(berteam, tmp_path):
+    optuna = pytest.importorskip("optuna")
+    asked = {"overrides": [*RPS, "epochs=1"], "trials": 1, "at_once": 1, "seed": 0}
+    Sweep(tmp_path / "sweep", "train", {}, asked | {"ranges": {"env.reward": ["os:abort"]}}).keep()
+    assert "env.reward='os:abort', which may run code" in berteam("sweep", "--resume", "sweep", code=2).stderr
+    Sweep(tmp_path / "sweep", "train", {}, asked | {"ranges": 3}).keep()
+    assert "holds no search that can go on" in berteam("sweep", "--resume", "sweep", code=2).stderr
+    # A trial whose value is none of the range's, as only a hand can have written it
+    Sweep(tmp_path / "sweep", "train", {}, asked | {"ranges": {"selector": ["uniform"]}}).keep()
+    backend = optuna.storages.journal.JournalFileBackend(str(tmp_path / "sweep" / "optuna.log"))
+    storage = optuna.storages.JournalStorage(backend)
+    study = optuna.create_study(study_name="berteam", storage=storage, direction="maximize")
+    study.ask({"selector": optuna.distributions.CategoricalDistribution(["trust=os:abort"])})
+    berteam("sweep", "--resume", "sweep")
+    assert Sweep.read(tmp_path / "sweep").jobs == {}
+    assert [trial.state.name for trial in study.get_trials()] == ["FAIL"]
+
+
+def test_a_job_whose_words_do_not_fit_for_a_while_keeps_what_it_has(berteam, tmp_path):
+    sweep, job = tmp_path / "sweep", tmp_path / "sweep" / "0"
+    Sweep(sweep, "train", {0: [*RPS, "epochs=2"]}).keep()
+    berteam("sweep", "--resume", "sweep")
+    manifest = Manifest.of(job)
+    manifest.add(status="interrupted")
+    kept = sorted(path.name for path in (job / "checkpoint").iterdir())
+    Sweep(sweep, "train", {0: [*RPS, "epochs=2", "selector=mine"]}).keep()  # as where --config-dir is forgotten
+    berteam("sweep", "--resume", "sweep", code=3)
+    (row,) = table(sweep).itertuples()
+    assert row.status == "interrupted"
+    assert "mine" in row.error
+    assert sorted(path.name for path in (job / "checkpoint").iterdir()) == kept
+    Sweep(sweep, "train", {0: [*RPS, "epochs=2"]}).keep()
+    berteam("sweep", "--resume", "sweep")
+    assert len(Manifest.of(job).facts["resumed"]) == 1  # it went on
+    assert table(sweep).status[0] == "done"
+
+
+def test_a_job_is_asked_to_stop_wherever_it_runs(berteam, tmp_path, monkeypatch):
+    """By a file that all see, as not every process hears of Ctrl-C. One that lies there from before asks for nothing."""
+    from berteam_cli.command import train  # noqa: PLC0415
+
+    sweep, whole = tmp_path / "sweep", train.epoch
+    Sweep(sweep, "train", {0: [*RPS, "epochs=5"]}).keep()
+    stop = sweep / LOCKS / STOP
+
+    def epoch(run, parts):
+        if run.epoch == 2:
+            stop.touch()
+        return whole(run, parts)
+
+    monkeypatch.setattr(train, "epoch", epoch)
+    berteam("train", *RPS, "epochs=5", "out=sweep/0", code=130)
+    assert len(pd.read_csv(sweep / "0" / "timing.csv")) == 3
+    monkeypatch.setattr(train, "epoch", whole)
+    assert stop.exists()
+    berteam("resume", "sweep/0")
+    assert len(pd.read_csv(sweep / "0" / "timing.csv")) == 5
+
+
+def test_a_job_is_one_of_its_sweep_s_from_within_its_folder_too(berteam, tmp_path, monkeypatch):
+    sweep = tmp_path / "sweep"
+    Sweep(sweep, "train", {0: [*RPS, "epochs=2"]}).keep()
+    berteam("sweep", "--resume", "sweep")
+    monkeypatch.chdir(sweep / "0")
+    with working(sweep / "0"):
+        assert "Another process is at work" in berteam("resume", ".", "epochs=3", code=2).stderr
+    before = (sweep / "sweep.csv").read_text()
+    berteam("resume", ".", "epochs=3")
+    assert (sweep / "sweep.csv").read_text() != before
+
+
 def test_what_does_not_go_together_is_refused_and_the_rest_runs(berteam, tmp_path):
     Sweep(tmp_path / "sweep", "train", {0: [*RPS, "selector=nobody"], 1: [*RPS, "epochs=1"]}).keep()
     refused = berteam("sweep", "--resume", "sweep", code=3).stderr
@@ -309,6 +398,28 @@ def test_optuna_searches_and_goes_on(berteam, tmp_path):
     assert "Best of 3 trials" in failed.stdout
     assert list(table(tmp_path / "sweep").overrides) == list(rows.overrides)
     assert list(table(tmp_path / "sweep").status) == ["done", "done", "done", "failed"]
+
+
+def test_a_trial_whose_process_died_is_not_told_as_failed(berteam, tmp_path):
+    pytest.importorskip("optuna")
+    from berteam_cli.sweep.search import search  # noqa: PLC0415
+
+    asked = {"overrides": [*RPS, "epochs=1", "evaluation.games=200"], "trials": 2, "at_once": 1, "seed": 0}
+    Sweep(tmp_path / "sweep", "train", {}, asked | {"ranges": {"seed": [1, 2]}}).keep()
+    begun = []
+
+    def killed(jobs):  # as the launcher leaves it: a run that began, and nobody at work on it
+        begun.extend(jobs)
+        for job in jobs:
+            (tmp_path / "sweep" / str(job)).mkdir()
+            Manifest.begun(tmp_path / "sweep" / str(job))
+        make_table(tmp_path / "sweep")
+        return True
+
+    search(Sweep.read(tmp_path / "sweep"), killed)
+    assert begun == [0]
+    assert "Best of 2 trials" in berteam("sweep", "--resume", "sweep").stdout
+    assert list(table(tmp_path / "sweep").status) == ["done", "done"]
 
 
 @pytest.mark.parametrize(
