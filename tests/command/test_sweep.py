@@ -289,7 +289,7 @@ def test_a_job_whose_words_do_not_fit_for_a_while_keeps_what_it_has(berteam, tmp
 
 
 def test_a_job_is_asked_to_stop_wherever_it_runs(berteam, tmp_path, monkeypatch):
-    """By a file that all see, as not every process hears of Ctrl-C. One that lies there from before asks for nothing."""
+    """By a file that all see, as not every process hears of Ctrl-C. One that lay there before asks for nothing."""
     from berteam_cli.command import train  # noqa: PLC0415
 
     sweep, whole = tmp_path / "sweep", train.epoch
