@@ -24,6 +24,8 @@ NAMES = (
 
 def test_names_of_folders_are_no_formulas_and_no_orders_to_a_terminal(run, berteam):
     folders = [str(run("hands", name)) for name in NAMES]
+    for seed, folder in enumerate(folders):  # else they were one training, and could not be compared
+        changed(Path(folder), "seed: 0\nteam_size", f"seed: {seed}\nteam_size")
     joined = ",".join("'" + name.replace("'", "\\'") + "'" for name in folders)
     words = ["tournament", f"run=[{joined}]", "top=1", "games_per_pair=2", "out=t"]
     out = berteam(*words).stdout + berteam("inspect", "t").stdout

@@ -154,7 +154,7 @@ def test_second_games_answer_games_among_the_population_alone():
     run, report = epoch(begin(made), made)
     assert (len(report.outcomes.scores), len(report.met.teams), run.played) == (8, 4, 12)
     assert sum(learnt.steps for _, learnt in report.learnt) == 12 * 4 - 4 * 2
-    with pytest.raises(InputError, match=r"games_per_epoch must be even .* but is 12, 3 of them against opponents"):
+    with pytest.raises(InputError, match=r"games_per_epoch less the 3 against opponents must be even .* but is 9\."):
         parts(*words, "opponents=past", "opponents.past_share=0.25")
 
 
