@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -100,6 +99,7 @@ def check_sweep_folder(overrides: list[Override]) -> None:
     """
     from berteam_cli.folder import MANIFEST  # noqa: PLC0415 (it brings torch, which --help does not need)
     from berteam_cli.sweep.folder import JOBS  # noqa: PLC0415 (as above)
+    from berteam_cli.terminal import berteam  # noqa: PLC0415 (as above)
 
     for override in overrides:
         if override.key_or_group == "hydra.sweep.dir":
@@ -107,7 +107,7 @@ def check_sweep_folder(overrides: list[Override]) -> None:
             if (folder / JOBS).exists() or (folder.is_dir() and any((x / MANIFEST).exists() for x in folder.iterdir())):
                 raise InputError(
                     f"hydra.sweep.dir={folder} holds a sweep already; choose another folder, "
-                    f"or go on with it: berteam sweep --resume {shlex.quote(str(folder))}"
+                    f"or go on with it: {berteam('sweep --resume', [folder])}"
                 )
 
 

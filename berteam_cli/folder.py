@@ -6,7 +6,6 @@ import json
 import logging
 import os
 import platform
-import shlex
 import shutil
 import sys
 import traceback
@@ -21,7 +20,7 @@ from typing import Any
 from berteam_cli.errors import InputError, RunError, shown
 from berteam_cli.quiet import written
 from berteam_cli.records import COLUMNS, EVALUATION, SHEET_ENDINGS, SHEETS
-from berteam_cli.terminal import Printed
+from berteam_cli.terminal import Printed, berteam
 
 MANIFEST, CONFIG, LOG, ERROR = "manifest.json", "config.yaml", "log.txt", "error.txt"
 PACKAGES = ("berteam-cli", "torch", "numpy", "numba", "pandas", "stable-baselines3", "pettingzoo", "hydra-core")
@@ -173,7 +172,7 @@ class Manifest:
             if again:
                 return again
             if resumable and newest(self.folder) >= 0:
-                return f"Go on with: berteam resume {shlex.quote(str(self.folder))}"
+                return f"Go on with: {berteam('resume', [self.folder])}"
             return "Begin anew with on_exists=overwrite."
 
         try:

@@ -64,7 +64,7 @@ def test_as_many_games_as_are_said_to_fit_do(more, monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 2 * 2**30)
 
     def made(games):
-        return build.parts(checked(composed("population=ppo6", f"games_per_epoch={games}", *more)), read_only=False)
+        return build.parts(checked(composed("population=ppo6", f"games_per_epoch={games}", *more)))
 
     with pytest.raises(InputError, match=r"games_per_epoch must be <= \d+, but is 10000: ") as refused:
         made(10_000)

@@ -16,6 +16,7 @@ from berteam_cli.quiet import written
 from berteam_cli.sweep import plan
 from berteam_cli.sweep.folder import LOCKS, STOP, TABLE, Sweep, working
 from berteam_cli.sweep.search import check_search, ends, words_of
+from berteam_cli.terminal import berteam
 
 Check = Callable[[str, list[str]], object]
 """Checks the words of a command as Hydra would compose them; raises InputError."""
@@ -134,7 +135,7 @@ def resumed(folder: Path, words: list[str], check: Check, launch: Launch) -> Non
     sweep = Sweep.read(folder)
     if sweep.command not in plan.SWEPT:
         raise InputError.choice(f"{folder}: command", sweep.command, plan.SWEPT)
-    given, again = arguments(words).overrides, ["berteam", "sweep", "--resume", str(folder)]
+    given = arguments(words).overrides
     stored = {word for job in sweep.unfinished() for word in sweep.jobs[job]} | set(words_of(sweep.search))
     for word in given:
         if word not in stored and not word.startswith(LAUNCHER):
@@ -145,11 +146,16 @@ def resumed(folder: Path, words: list[str], check: Check, launch: Launch) -> Non
         if plan.of_hydra(word) or NAMES_CODE.search(word):
             raise InputError(
                 f"A job of {folder} says {word}, which may run code or send something elsewhere, and what only lies in "
-                f"a folder never does; if it is yours, say it too: {shlex.join([*again, *words, word])}"
+                f"a folder never does; if it is yours, say it too: {going_on(folder, [*words, word])}"
             )
     words = [*plan.flags(words), *(word for word in given if word not in stored)]
     check(sweep.command, words)
     carry_out(folder, [*words, f"hydra.sweep.dir={plan.spelt(str(folder))}"], launch)
+
+
+def going_on(folder: Path, words: list[str]) -> str:
+    """Returns the command line that goes on with the sweep in ``folder``, with these ``words``."""
+    return berteam("sweep --resume", [folder], *map(shlex.quote, words))
 
 
 def carry_out(folder: Path, words: list[str], launch: Launch, *, ours: bool = True) -> None:
@@ -169,7 +175,7 @@ def carry_out(folder: Path, words: list[str], launch: Launch, *, ours: bool = Tr
     command, flags = Sweep.read(folder).command, plan.flags(words)
     settings = [word for word in arguments(words).overrides if plan.of_hydra(word)]
     how = [word for word in settings if not word.startswith("hydra.sweep.dir=")]
-    again = shlex.join(["berteam", "sweep", "--resume", str(folder), *flags[1:], *how])
+    again = going_on(folder, [*flags[1:], *how])
     written(folder)
     print(f"{folder}: see {folder / TABLE}", flush=True)
     with working(folder / "sweep"):

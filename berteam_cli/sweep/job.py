@@ -49,7 +49,7 @@ def swept(task: Callable[[], float], folder: Path, overrides: list[str], *, alon
             except Exception as failure:  # a mistake of ours must not cost the other jobs
                 status, error = "failed", f"{type(failure).__name__}: {failure} (traceback in {folder / ERROR})."
                 (folder / ERROR).write_text(traceback.format_exc(), encoding="utf-8")
-            manifest = Manifest.of(folder) if (folder / MANIFEST).exists() else Manifest.begun(folder, status=status)
+            manifest = manifest_of(folder, status)
             if status == "failed":
                 manifest.add(status=status)
             manifest.add(overrides=overrides, error=error)
@@ -61,6 +61,17 @@ def swept(task: Callable[[], float], folder: Path, overrides: list[str], *, alon
     if status == "interrupted" and not alone:
         raise KeyboardInterrupt
     return figure
+
+
+def manifest_of(folder: Path, status: str) -> Manifest:
+    """Returns the manifest of the job in ``folder``, which begins with ``status`` if there is none.
+
+    What had begun keeps its status: it may still go on.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    return Manifest.of(folder) if (folder / MANIFEST).exists() else Manifest.begun(folder, status=status)
 
 
 def told(job: str | int, overrides: list[str], error: str) -> str:

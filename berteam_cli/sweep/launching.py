@@ -18,9 +18,9 @@ from omegaconf.errors import OmegaConfBaseException
 
 from berteam_cli.compose import said
 from berteam_cli.errors import InputError
-from berteam_cli.folder import MANIFEST, Manifest
+from berteam_cli.folder import MANIFEST
 from berteam_cli.sweep.folder import LOCKS, STOP, Sweep, working, write_table
-from berteam_cli.sweep.job import told
+from berteam_cli.sweep.job import manifest_of, told
 from berteam_cli.sweep.process import HERE
 
 PRINTING = (HERE, "JoblibLauncher")  # their jobs' words reach the terminal
@@ -89,9 +89,7 @@ class Batch:
             folder = self.sweep.folder / str(job)
             folder.mkdir(exist_ok=True)
             with suppress(InputError), working(folder):  # else whoever is at work there tells what becomes of it
-                begun = (folder / MANIFEST).exists()  # then it may still go on, with other words or another version
-                manifest = Manifest.of(folder) if begun else Manifest.begun(folder, status="refused")
-                manifest.add(overrides=self.sweep.jobs[job], error=said(error))
+                manifest_of(folder, "refused").add(overrides=self.sweep.jobs[job], error=said(error))
             print(told(job, self.sweep.jobs[job], said(error)), file=sys.stderr, flush=True)
             return False
         return True

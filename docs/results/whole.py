@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from curves import of_choice
@@ -112,14 +113,19 @@ def ends(runs: pd.DataFrame, games: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def since(of_run: pd.DataFrame) -> Any:
+    """Returns the looks of a run at its choice after the first, by the spans in which they fall."""
+    choice = of_choice(of_run).loc[1:]
+    return choice.groupby(spans(choice.index))
+
+
 def courses(looks: pd.DataFrame, games: pd.DataFrame) -> pd.DataFrame:
     """Returns the table of how each run went: mean Elo of its looks, share of their games won, of own games decided."""
     rows = []
     for (variant, seed), of_run in looks.groupby(["variant", "seed"], sort=False):
-        choice = of_choice(of_run).loc[1:]
-        since = choice.groupby(spans(choice.index))
+        looked = since(of_run)
         own = games[(games.variant == variant) & (games.seed == seed)].set_index("to_epoch")
-        shares = zip(since.elo.mean(), since.wins.sum() / since.games.sum(), own.decided / own.games, strict=True)
+        shares = zip(looked.elo.mean(), looked.wins.sum() / looked.games.sum(), own.decided / own.games, strict=True)
         cells = [f"{elo:.0f} / {won:.2f} / {decided:.3f}" for elo, won, decided in shares]
         columns = [f"to {epoch:,}" for epoch in own.index]
         rows.append({"": f"{named(variant)}, {seed}"} | dict(zip(columns, cells, strict=True)))
@@ -130,13 +136,12 @@ def coevolution(looks: pd.DataFrame, games: pd.DataFrame) -> pd.DataFrame:
     """Returns the table of how the runs of one variant went, a row for each span, its seeds side by side."""
     rows = []
     for seed, of_run in looks.groupby("seed"):
-        choice = of_choice(of_run).loc[1:]
-        since = choice.groupby(spans(choice.index))
+        looked = since(of_run)
         own = games[games.seed == seed].set_index("to_epoch")
         cells = {
-            "expected Elo of the choice": since.elo.mean().map("{:.0f}".format),
-            "won": since.wins.sum().map("{:,}".format),
-            "lost": since.losses.sum().map("{:,}".format),
+            "expected Elo of the choice": looked.elo.mean().map("{:.0f}".format),
+            "won": looked.wins.sum().map("{:,}".format),
+            "lost": looked.losses.sum().map("{:,}".format),
             "own games decided": (own.decided / own.games).map("{:.4f}".format),
             "grabs in an own game": (own.grabs / own.games).map("{:.3f}".format),
         }

@@ -10,9 +10,9 @@ from pettingzoo import ParallelEnv
 
 from mctf import render, snapshot, spaces
 from mctf.batch import checked_count
-from mctf.kernel import RUNNING, TIME_OUT, finished
+from mctf.kernel import RUNNING, finished
 from mctf.lanes import direct, empty_lanes, empty_scratch, look, start_lanes, step_lanes
-from mctf.rewards import make_reward
+from mctf.rewards import is_over, make_reward
 from mctf.rules import Rules, make_rules
 from mctf.state import CAPTURES, EVENTS, GRABS, TAGS
 from mctf.view import allowed_action, is_allowed, make_view
@@ -191,13 +191,13 @@ class MctfEnv(ParallelEnv[str, Any, Any]):
         end, agents = self._lanes.end[0], self.agents
         if end != RUNNING:
             self.agents = []
-        truncated = bool(end == TIME_OUT and not self._reward.ends_on_time)
+        terminated = bool(is_over.py_func(end, self._reward))
         observations, infos = self._shown()
         return (
             observations,
             dict(zip(agents, self._lanes.paid[0].tolist(), strict=True)),
-            dict.fromkeys(agents, bool(end != RUNNING and not truncated)),
-            dict.fromkeys(agents, truncated),
+            dict.fromkeys(agents, terminated),
+            dict.fromkeys(agents, bool(end != RUNNING and not terminated)),
             infos,
         )
 
