@@ -9,6 +9,7 @@ docs/security.md has the whole rule.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from berteam_cli.config_env import EnvConfig, MctfConfig, PettingzooConfig
 from berteam_cli.errors import InputError
 
 TRUST = "trust"
+LIST = re.compile(r"\[.*\]")  # of several, as Hydra writes it
 
 
 def imported(env: EnvConfig) -> dict[str, str]:
@@ -61,4 +63,6 @@ def told(overrides: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
         InputError: one is no import path.
     """
     mine = [word for word in overrides if word.startswith(f"{TRUST}=")]
-    return trusted([word.partition("=")[2] for word in mine]), [word for word in overrides if word not in mine]
+    values = [word.partition("=")[2] for word in mine]
+    paths = [path.strip() for value in values for path in (value[1:-1].split(",") if LIST.fullmatch(value) else [value])]
+    return trusted(paths), [word for word in overrides if word not in mine]

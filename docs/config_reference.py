@@ -34,7 +34,8 @@ shells around any bracket.
 wrong type or out of its range, and a key that is not here, are refused with the nearest right one.
 
 `berteam resume` takes `epochs`, `workers`, `checkpoint_every`, `evaluation.*` and `logger`; `berteam export` takes
-`agent`, `out` and `on_exists`; `berteam inspect` takes `--top`.
+`agent`, `out` and `on_exists`; `berteam inspect` takes `--top`; all of them `trust` (the words of a run's folder are
+imported only if you say them, too).
 """
 WORDS = {"bool": "true, false", "int": "whole number", "float": "number", "str": "text", "Any": "see the comment"}
 

@@ -9,6 +9,7 @@ from gymnasium.spaces import Box
 
 from berteam_cli.env.base import Env
 from berteam_cli.env.mctf import Mctf
+from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.errors import InputError, did_you_mean
 from berteam_cli.folder import write_whole
 from berteam_cli.learner.exporting import exported
@@ -17,9 +18,9 @@ from berteam_cli.population import island_of, names
 from berteam_cli.quiet import written
 from berteam_cli.reading import last_state
 from berteam_cli.terminal import end, say
-from berteam_cli.trust import told
+from berteam_cli.trust import TRUST, told
 
-KEYS = ("agent", "out", "on_exists")
+KEYS = ("agent", "out", "on_exists", TRUST)
 ON_EXISTS = ("error", "overwrite")
 
 
@@ -55,6 +56,8 @@ def export(folder: Path, overrides: list[str]) -> Path:
     say(f"{called} of {folder} after epoch {run.epoch}.")
     if steps > 1:
         say(f"It sees the observations of the last {steps} steps in one, the newest first (last_steps in the file).")
+    if isinstance(parts.games.env, Pettingzoo):
+        say("It sees observations as one row of numbers (a Discrete one one-hot), and calls the first action 0.")
     written(path)
     end(path.parent, [path.name], f"in Python: {loading(type(model), path)}")
     return path
@@ -100,8 +103,13 @@ def place(folder: Path, agent: int, given: dict[str, str]) -> Path:
     Raises:
         InputError: it exists and may not be overwritten.
     """
-    out = given["out"] or str(folder / f"agent_{agent}.zip")
-    path = Path(out if out.endswith(".zip") else f"{out}.zip")
+    name, out = f"agent_{agent}.zip", given["out"]
+    if not out:
+        path = folder / name
+    elif out.endswith("/") or (Path(out).is_dir() and not out.endswith(".zip")):
+        path = Path(out) / name
+    else:
+        path = Path(out if out.endswith(".zip") else f"{out}.zip")
     if path.is_dir() or (path.exists() and given["on_exists"] != "overwrite"):
         raise InputError(f"{path} exists already; name another file with out=FILE, or say on_exists=overwrite.")
     return path

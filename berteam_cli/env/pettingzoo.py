@@ -7,7 +7,6 @@ import logging
 import os
 import re
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,9 @@ from berteam_cli.errors import RunError
 from berteam_cli.outcomes import Ints
 
 log = logging.getLogger("berteam")
+
+KNOWN: dict[str, Facts] = {}
+"""What environments are like, by their settings: a sweep builds its environment many times."""
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -68,7 +70,7 @@ class Pettingzoo:
         if score != REWARD and not (score.startswith(INFO) and score != INFO):
             raise ValueError(f"score must be {REWARD}, or {INFO}KEY with a key of the infos, but is {score!r}.")
         game = Game(target, options, teams, max_steps, score, os.getcwd())
-        facts = inspected(json.dumps(game))
+        facts = inspected(game)
         size = len(facts.agents) // 2
         if size != team_size:
             raise ValueError(f"target has teams of {size}, but team_size is {team_size}; say team_size={size}.")
@@ -105,23 +107,26 @@ class Pettingzoo:
     def fingerprint(self) -> dict[str, object]:  # noqa: D102
         settings = self.game._asdict()
         del settings["folder"]
-        return {"env": self.name, **settings}
+        told: dict[str, object] = json.loads(json.dumps(settings))  # whose keys can be sorted: options may have numbers
+        return {"env": self.name, **told}
 
 
-@cache  # a sweep builds its environment many times
-def inspected(settings: str) -> Facts:
-    """Returns what the environment of a Game, as JSON, is like.
+def inspected(game: Game) -> Facts:
+    """Returns what the environment is like. Adds to ``KNOWN``.
 
     Raises:
         ValueError: it cannot be made, or not be played by two equal teams.
     """
-    worker = WorkerProcess(Game(*json.loads(settings)))
-    try:
-        return worker.facts()
-    except Failed as failure:
-        raise ValueError(failure.why) from None
-    finally:
-        worker.close()
+    settings = repr(game)
+    if settings not in KNOWN:
+        worker = WorkerProcess(game)
+        try:
+            KNOWN[settings] = worker.facts()
+        except Failed as failure:
+            raise ValueError(failure.why) from None
+        finally:
+            worker.close()
+    return KNOWN[settings]
 
 
 def settle(results: Results, b: int, played: Played) -> None:

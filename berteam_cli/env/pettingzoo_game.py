@@ -18,6 +18,7 @@ from berteam_cli.env.pettingzoo_made import Facts, Game, Unfit
 from mctf.draws import next_uniform
 
 REWARD, INFO = "reward", "info:"  # what decides a game: the rewards, or an entry of the infos
+LARGEST = float(np.finfo(np.float32).max)  # of a reward, as learners keep them
 ROUNDING = 1e-6  # of all that was paid: fractions that differ by less are alike, as float32 keeps seven digits
 
 
@@ -123,6 +124,9 @@ def begun(env: ParallelEnv[str, Any, Any], facts: Facts, seed: int) -> list[Play
     Raises:
         Unfit: an agent is not there.
     """
+    for i, name in enumerate(facts.agents):  # spaces draw from generators of their own, which no reset seeds
+        for space in (env.action_space(name), env.observation_space(name)):
+            space.seed(seed + i)
     observations, infos = env.reset(seed=seed)
     players = []
     for name in facts.agents:
@@ -164,8 +168,8 @@ def note(players: list[Player], stepped: tuple[Any, ...], there: set[str], *, re
                 raise Unfit(f"agent {player.name} is in the game again after it had left, which is not supported")
             continue
         reward = float(entry(rewards, player, "rewards"))
-        if not isfinite(reward):
-            raise Unfit(f"the reward of agent {player.name} must be a finite number, but is {reward}")
+        if not abs(reward) <= LARGEST:
+            raise Unfit(f"the reward of agent {player.name} must be a finite number of 32 bits, but is {reward}")
         player.rewards.append(reward)
         player.terminated = bool(entry(terminations, player, "terminations"))
         gone = player.terminated or bool(entry(truncations, player, "truncations")) or player.name not in there

@@ -133,7 +133,7 @@ def places(possible: list[str], teams: dict[str, list[str]]) -> tuple[str, ...]:
     agents = [*teams["blue"], *teams["red"]]
     for agent in agents:
         if agent not in possible:
-            near = did_you_mean(agent, possible)
+            near = did_you_mean(str(agent), map(str, possible))
             raise Unfit(f"teams has {agent!r}, but the agents are {', '.join(map(str, possible))}.{near}")
     for agent in possible:
         if agents.count(agent) != 1:

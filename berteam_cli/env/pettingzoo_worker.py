@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import random
 import signal
 import sys
 import threading
@@ -62,6 +63,8 @@ def serve(connection: Connection, game: Game) -> None:
     threading.Thread(target=end_with_parent, daemon=True).start()
     if game.folder not in sys.path:
         sys.path.append(game.folder)  # last, so that it hides nothing
+    random.seed(0)  # an environment may draw when it is made, and must be the same in every process
+    np.random.seed(0)  # noqa: NPY002
     try:
         env = made(game)
         facts = facts_of(env, game.teams)
@@ -84,7 +87,8 @@ def serve(connection: Connection, game: Game) -> None:
                 if isinstance(answer, Failed):
                     break
     except (EOFError, OSError):  # nobody asks any more
-        env.close()
+        with suppress(Exception):  # of foreign code, and nobody would read what it says
+            env.close()
 
 
 def leave_group() -> None:

@@ -63,9 +63,12 @@ def test_members_act_the_same_when_loaded(run, berteam, tmp_path):
         np.testing.assert_allclose(shares, chances, atol=5e-4)
         assert model.num_timesteps > 0
         assert model.policy.optimizer.state_dict()["state"]
+    for agent, out in ((6, "there/"), (11, "there"), (11, "there/agent_6")):
+        berteam("export", "run", f"agent={agent}", f"out={out}", "on_exists=overwrite")
+    assert sorted(path.name for path in (tmp_path / "there").iterdir()) == ["agent_11.zip", "agent_6.zip"]
+    berteam("export", "run", "agent=6", "out=there", "on_exists=overwrite")
     for agent in (6, 11):
-        berteam("export", "run", f"agent={agent}", f"out=there/{agent}")
-        model = DQN.load(tmp_path / "there" / f"{agent}.zip")
+        model = DQN.load(tmp_path / "there" / f"agent_{agent}.zip")
         action, _ = model.predict(seen, deterministic=True)
         assert action == act(ours, agent, seen, work, 0.5, 0.5)
 

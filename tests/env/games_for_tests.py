@@ -87,10 +87,32 @@ class Guess(Contest):
 
 
 class Careless(Contest):
-    """Draws from the generators that all of Python and numpy share."""
+    """Draws from the generators that all of Python and numpy share, also when it is made, and from those of spaces.
+
+    It cannot be closed. ``pay`` has a number for a key.
+    """
+
+    def __init__(self, team_size=1, pay=None):
+        super().__init__(team_size)
+        assert pay is None or pay[0] == 1.5
+        self.map = random.random() * np.random.random()  # noqa: NPY002
+        self.spaces = {agent: (Box(0.0, 1.0, (2, 2)), Discrete(3)) for agent in self.possible_agents}
+
+    def observation_space(self, agent):
+        return self.spaces[agent][0]
+
+    def action_space(self, agent):
+        return self.spaces[agent][1]
 
     def see(self):
-        return {agent: np.full((2, 2), random.random() * np.random.random()) for agent in self.agents}  # noqa: NPY002
+        seen = {}
+        for agent, (box, actions) in self.spaces.items():
+            seen[agent] = np.full((2, 2), random.random() * np.random.random())  # noqa: NPY002
+            seen[agent][0] = box.sample()[0] * (1 + actions.sample()) / 3 * self.map
+        return seen
+
+    def close(self):
+        self.window.close()
 
 
 class Faulty(Contest):

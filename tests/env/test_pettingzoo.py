@@ -9,7 +9,9 @@ from berteam_cli.acting import fixed_policies, joined
 from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.env.pettingzoo_game import played
 from berteam_cli.env.pettingzoo_made import Facts, Game, Unfit, facts_of, places
+from berteam_cli.env.pettingzoo_worker import close
 from berteam_cli.errors import RunError
+from berteam_cli.evaluation.reference import table_name
 from berteam_cli.games import Games, pairings
 from berteam_cli.workers import Workers
 from tests.env import games_for_tests
@@ -117,11 +119,23 @@ def test_few_games_are_shared_by_all_processes():
     assert len(games.env.processes.idle) == 2
 
 
-def test_environments_that_share_pythons_generators_are_repeatable_too():
-    games = zoo(f"{HERE}:Careless", 2)
-    first, second = (games.play(fixed_policies([0]), anyone(6), 3, record=True)[1].observations for _ in range(2))
-    np.testing.assert_array_equal(first[:, :, :6], second[:, :, :6])
+def test_environments_that_share_pythons_generators_are_repeatable_too(capfd):
+    """Also where they draw when they are made, and from their spaces, whichever process plays them."""
+    games = [zoo(f"{HERE}:Careless", 2), zoo(f"{HERE}:Careless", 1, pay={0: 1.5})]
+    first, *others = (
+        x.play(fixed_policies([0]), anyone(6), 3, record=True)[1].observations for x in (games[0], *games)
+    )
+    for other in others:
+        np.testing.assert_array_equal(first[:, :, :6], other[:, :, :6])
     assert len({game[:, :6].tobytes() for game in first}) == 12
+    for x in games:
+        close(x.env.processes.idle)
+    assert capfd.readouterr().err == ""
+
+
+def test_games_with_numbers_for_keys_have_a_fingerprint_and_others_another():
+    mixed, other = (zoo(f"{HERE}:Careless", pay={0: 1.5, "a": a}).env for a in (1.0, 2.0))
+    assert table_name(mixed) == table_name(mixed) != table_name(other)
 
 
 def test_mctf_through_pettingzoo_is_mctf():
@@ -228,7 +242,7 @@ def test_agents_that_are_refused(settings, said):
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        ("reward", "the reward of agent left_0 must be a finite number, but is nan"),
+        ("reward", "the reward of agent left_0 must be a finite number of 32 bits, but is nan"),
         ("observation", "the observation of agent left_0 must be finite and in Box"),
         ("shape", "the observation of agent left_0 must be finite and in Box"),
         ("silent", "rewards must have an entry for agent left_0, but has only ['right_0']"),
@@ -255,6 +269,13 @@ def test_environments_that_break_their_word(fault, said):
 def test_equal_fractions_are_a_draw_and_whole_numbers_are_exact(blue, red, winner, kind):
     wages = {"left_0": list(map(kind, blue)), "right_0": list(map(kind, red))}
     assert np.sign(alone(Contest(time=2, wages=wages)).gap) == winner
+
+
+def test_a_reward_is_a_number_of_32_bits():
+    most = float(np.finfo(np.float32).max)
+    assert alone(Contest(time=2, wages={"left_0": [most, -most]})).rewards[0] == [most, -most]
+    with pytest.raises(Unfit, match=r"the reward of agent left_0 must be a finite number of 32 bits, but is -3.5e\+38"):
+        alone(Contest(time=2, wages={"left_0": [0.0, -3.5e38]}))
 
 
 def test_an_info_that_decides_must_be_there():
