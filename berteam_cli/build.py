@@ -21,15 +21,13 @@ from berteam_cli.env.mctf import Mctf
 from berteam_cli.env.pettingzoo import Pettingzoo
 from berteam_cli.env.rps import Rps
 from berteam_cli.errors import InputError
-from berteam_cli.evolving import breeding, niches
-from berteam_cli.founding import check_policies
+from berteam_cli.evolving import breeding, measured_by, niches
 from berteam_cli.frozen import everybody
 from berteam_cli.games import Games
 from berteam_cli.memory import Room, check_memory
 from berteam_cli.opponents.none import Nobody
 from berteam_cli.opposing import opponents as opposing
 from berteam_cli.opposing import without_exploiters
-from berteam_cli.optimizer.aggression import opponents
 from berteam_cli.optimizer.base import Optimizer
 from berteam_cli.optimizer.coevolution import Coevolution
 from berteam_cli.optimizer.fitness import CaptainElo, FitnessRule, MovingAverage
@@ -277,8 +275,5 @@ def optimizer(config: TrainConfig, islands: tuple[Island, ...], playing: Games) 
     if "behaviours" in settings:
         settings |= niches(settings, config.team_size, playing.env, config.seed)
     if "opponents" in settings:
-        names = settings["opponents"] or list(playing.env.fixed_policies[: playing.env.standard_policies])
-        check_policies(names, playing.env, "optimizer.opponents, or optimizer.opponents=[] for the standard ones,")
-        indices = tuple(playing.env.fixed_policies.index(x) for x in names)
-        settings["opponents"] = opponents(indices, config.team_size)
+        settings["opponents"] = measured_by(settings["opponents"], config.team_size, playing.env)
     return chosen(islands, rule, **settings)

@@ -9,16 +9,20 @@ import numpy as np
 
 from berteam_cli.env.base import Env, Spatial, Weighing
 from berteam_cli.errors import InputError
+from berteam_cli.founding import check_policies
 from berteam_cli.learner.breeding import Breedable
 from berteam_cli.learner.traits import TRAITS, Tunable
+from berteam_cli.optimizer.aggression import opponents
 from berteam_cli.optimizer.archive import Archive, grid, voronoi
 from berteam_cli.optimizer.breeding import Breeding
 from berteam_cli.optimizer.perturbing import Perturbation
-from berteam_cli.outcomes import BEHAVIOURS
+from berteam_cli.outcomes import BEHAVIOURS, Ints
 from berteam_cli.population import Island
+from berteam_cli.selector.base import team_count
 from berteam_cli.training import ARCHIVE, generator
 
 MOST_CELLS = 10_000
+MOST_TEAMS = 10_000
 UNMOVED = {"learning_rate": 0.0, "entropy_coef": 0.0, "gamma": 1.0}
 """Values that no factor moves."""
 
@@ -111,6 +115,23 @@ def niches(settings: dict[str, Any], team_size: int, game: Env, seed: int) -> di
         else:
             made = voronoi(low, high, cells, generator(seed, ARCHIVE))
     return {"behaviours": tuple(names), "scales": np.array([scales[name] for name in names]), "archive": made}
+
+
+def measured_by(names: list[str], team_size: int, game: Env) -> Ints:
+    """Returns (J, T) the teams of fixed policies ``names``, none meaning the standard ones, that members meet.
+
+    Raises:
+        InputError: a name is none of the game's, or they are too many.
+    """
+    names = names or list(game.fixed_policies[: game.standard_policies])
+    check_policies(names, game, "optimizer.opponents, or optimizer.opponents=[] for the standard ones,")
+    count = team_count(len(names), team_size)
+    if count > MOST_TEAMS:
+        raise InputError(
+            f"optimizer.opponents must make at most {MOST_TEAMS:,} teams of team_size={team_size}, as a member meets "
+            f"each when it is measured, but its {len(names)} policies make {count:,}; name fewer."
+        )
+    return opponents(tuple(game.fixed_policies.index(name) for name in names), team_size)
 
 
 def check_behaviours(names: list[str], team_size: int, game: Env) -> None:

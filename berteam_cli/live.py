@@ -16,7 +16,7 @@ from rich.table import Table
 from berteam_cli.evaluation.sight import Sight
 from berteam_cli.optimizer.fitness import CaptainElo
 from berteam_cli.pace import Pace, spoken
-from berteam_cli.population import names
+from berteam_cli.population import names, rated
 from berteam_cli.records import team_name
 from berteam_cli.selector.base import TeamDistribution
 from berteam_cli.terminal import console, interactive
@@ -74,7 +74,7 @@ class View:
         label = "best Elo" if elo else "best mean score"
         if not self.run.played:
             return label, UNKNOWN
-        fittest = int(np.argmax(people.fitness))
+        fittest = int(np.argmax(np.where(rated(self.parts.optimizer.islands), people.fitness, -np.inf)))
         value = rule.shown(people.fitness)[fittest]
         called = names(self.parts.optimizer.islands, people)[fittest]
         return label, f"{value:,.0f} ({called})" if elo else f"{value:.3f} ({called})"

@@ -56,7 +56,9 @@ def state_bytes(island: Island) -> int:
 
 
 def check_memory(islands: tuple[Island, ...], rooms: list[Room]) -> None:
-    """Checks that what a run keeps in memory fits there, that of each device on it.
+    """Checks that what a run keeps in memory fits there, and what is on a GPU fits on it.
+
+    That is counted on the processor's side, too: it is made there, and a checkpoint is written from there.
 
     Args:
         islands: of the population.
@@ -65,14 +67,12 @@ def check_memory(islands: tuple[Island, ...], rooms: list[Room]) -> None:
     Raises:
         InputError: it does not; with the setting that takes most and the largest value that would fit.
     """
-    for device in ("cpu", "cuda"):
-        there = [island for island in islands if getattr(island.learner, "device", "cpu") == device]
-        if device == "cpu":
-            whole = available()
-            fits_there(there, rooms, (whole - BASE) // COPIES, whole)
-        elif there:
-            free, whole = torch.cuda.mem_get_info()
-            fits_there(there, [], free, whole)
+    whole = available()
+    fits_there(list(islands), rooms, (whole - BASE) // COPIES, whole)
+    there = [island for island in islands if getattr(island.learner, "device", "cpu") == "cuda"]
+    if there:
+        free, whole = torch.cuda.mem_get_info()
+        fits_there(there, [], free, whole)
 
 
 def fits_there(islands: list[Island], rooms: list[Room], limit: int, whole: int) -> None:

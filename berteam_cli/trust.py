@@ -64,5 +64,7 @@ def told(overrides: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
     """
     mine = [word for word in overrides if word.startswith(f"{TRUST}=")]
     values = [word.partition("=")[2] for word in mine]
-    paths = [path.strip() for value in values for path in (value[1:-1].split(",") if LIST.fullmatch(value) else [value])]
+    paths = [
+        path.strip() for value in values for path in (value[1:-1].split(",") if LIST.fullmatch(value) else [value])
+    ]
     return trusted(paths), [word for word in overrides if word not in mine]

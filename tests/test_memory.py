@@ -1,7 +1,9 @@
 import resource
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+import torch
 
 from berteam_cli import build, memory
 from berteam_cli.acting import fixed_policies
@@ -9,6 +11,7 @@ from berteam_cli.config import checked
 from berteam_cli.env.base import blank_trajectories, trajectory_bytes
 from berteam_cli.errors import InputError
 from berteam_cli.games import pairings
+from berteam_cli.learner.stacked_dqn import StackedDqn
 from tests.makers import mctf
 from tests.test_config import composed
 
@@ -57,6 +60,19 @@ def test_the_largest_buffer_that_is_said_to_fit_does(learner, key, step, monkeyp
     limited(monkeypatch, learner, f"learner.{key}={fits}", limit)
     with pytest.raises(InputError):
         limited(monkeypatch, learner, f"learner.{key}={fits + step}", limit)
+
+
+def test_members_on_a_gpu_must_fit_beside_it_too(monkeypatch):
+    """They are made there, and a checkpoint is written from there."""
+    islands = build.parts(checked(composed("population=ppo6", "learner=dqn"))).optimizer.islands
+    on_gpu = replace(islands[0], learner=StackedDqn(**asdict(islands[0].learner), device="cuda"))
+    taken = memory.state_bytes(on_gpu)
+    monkeypatch.setattr(torch.cuda, "mem_get_info", lambda: (2 * taken, 2 * taken))
+    monkeypatch.setattr(memory, "available", lambda: memory.BASE + 2 * taken)
+    memory.check_memory((on_gpu,), [])
+    monkeypatch.setattr(memory, "available", lambda: memory.BASE + 2 * taken - 2)
+    with pytest.raises(InputError, match=r"buffer_size must be <= \d+"):
+        memory.check_memory((on_gpu,), [])
 
 
 @pytest.mark.parametrize("more", [[], ["selector.observations.use=previous_game"]])

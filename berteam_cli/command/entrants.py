@@ -85,8 +85,10 @@ def check_rating(config: TournamentConfig, sides: int) -> None:
         InputError: they cannot.
     """
     test = config.sprt
-    if test.rounds > 1 and not test.elo0 < test.elo1:
-        raise InputError(f"sprt.elo0 must be below sprt.elo1, but they are {test.elo0:g} and {test.elo1:g}.")
+    if test.rounds > 1 and not test.elo0 < 0 < test.elo1:  # else equal teams would be told stronger and weaker
+        raise InputError(
+            f"sprt.elo0 must be below 0 and sprt.elo1 above it, but they are {test.elo0:g} and {test.elo1:g}."
+        )
     if sides > 2 and config.rating != "ml":
         raise InputError(f"rating={config.rating} is for games of two sides, but these have {sides}; use rating=ml.")
     if sides > 2 and test.rounds > 1:

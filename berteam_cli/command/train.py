@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -64,7 +66,10 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
     """Trains in a ``folder`` that this process holds; see ``train``."""
     started = time.monotonic()
     saved = resumed(config, text, folder, parts)
-    if saved is None:
+    before, sizes, done = (saved.seconds, saved.table_sizes, saved.run.epoch) if saved else (0.0, None, 0)
+    handed = deque([saved.run] if saved else [])  # who takes it lets go of it in time: what was loaded may be large
+    del saved
+    if not handed:
         claim(folder, "overwrite" if goes_on(config, folder) else config.on_exists)
     write_config(folder, text)
     with logging_to(folder):
@@ -77,9 +82,9 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         log.info(words, spoken(state), spoken(played), seen_by)
         if against := parts.opponents.remarks():
             log.info("Trained against %s, beside teams of the population.", "; ".join(against))
-        if saved:
-            log.info("Going on after epoch %d of %d.", saved.run.epoch, config.epochs)
-        manifest = (Manifest.resumed if saved else Manifest.begun)(folder, seed=config.seed)
+        if handed:
+            log.info("Going on after epoch %d of %d.", done, config.epochs)
+        manifest = (Manifest.resumed if handed else Manifest.begun)(folder, seed=config.seed)
         if against:
             manifest.add(trained_against="; ".join(against))
         if origin := next((x.origin for x in parts.optimizer.islands if x.origin), None):
@@ -88,11 +93,9 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         with manifest.until_the_end(), stoppable(folder.parent / LOCKS / STOP) as stop:
             told: Any = OmegaConf.to_container(OmegaConf.create(text))
             with logger(config.logger, folder, manifest.facts, told) as also:
-                run, recorder = trained(config, folder, parts, saved, started, stop, also)
-                before = saved.seconds if saved else 0.0
-                expected = conclude(
-                    config.evaluation, folder, run, recorder, manifest, lambda: before + time.monotonic() - started
-                )
+                took = lambda: before + time.monotonic() - started  # noqa: E731 (a clock, handed on)
+                run, recorder = trained(config, folder, parts, handed, sizes, took, stop, also)
+                expected = conclude(config.evaluation, folder, run, recorder, manifest, took)
                 also(run.epoch, {"elo/expected": expected})
     return expected
 
@@ -118,25 +121,42 @@ def resumed(config: TrainConfig, text: str, folder: Path, parts: Parts) -> Saved
 
 
 def trained(
-    config: TrainConfig, folder: Path, parts: Parts, saved: Saved | None, started: float, stop: Stop, also: Once
+    config: TrainConfig,
+    folder: Path,
+    parts: Parts,
+    handed: deque[Run],
+    sizes: dict[str, int] | None,
+    took: Callable[[], float],
+    stop: Stop,
+    also: Once,
 ) -> tuple[Run, Recorder]:
-    """Runs the epochs; returns the run after the last one, and what recorded it."""
+    """Runs the epochs; returns the run after the last one, and what recorded it.
+
+    Args:
+        config: of the run.
+        folder: of the run.
+        parts: of the run.
+        handed: the run to go on with, taken from there; empty: it begins.
+        sizes: bytes of each growing table of that run.
+        took: returns the seconds that it has taken.
+        stop: whether it is to end.
+        also: where its figures go beside its tables.
+    """
     watching = watched(config, parts)
-    sizes = saved.table_sizes if saved else None
     tables = Tables(folder, sizes, also_growing(parts, watched=watching is not None))
     recorder = Recorder(tables, parts, config.record_every, Exploiting(parts, config.payoff_steps), watching)
-    seconds = saved.seconds if saved else 0.0
-    run = saved.run if saved else begin(parts)
+    anew = not handed
+    run = begin(parts) if anew else handed.pop()
     run = replace(run, league=pool.on_disk(run.league, folder / pool.POOL))
 
     def keep() -> None:
         also.logger.flush()
-        checkpoint.save(folder, Saved(run, tables.sizes(), seconds + time.monotonic() - started), parts)
+        checkpoint.save(folder, Saved(run, tables.sizes(), took()), parts)
 
     for name in END_TABLES:
         (folder / f"{name}.csv").unlink(missing_ok=True)  # of an earlier end of this run
     distribution, sight = None, None
-    if saved is None:
+    if anew:
         distribution, sight = recorder.state(run), recorder.watched(run)
         also(run.epoch, seen(sight))
         keep()
@@ -155,10 +175,10 @@ def trained(
             asked = stop.wanted()  # later than this it ends after the next epoch
             if asked or run.epoch == config.epochs or run.epoch % config.checkpoint_every == 0:
                 keep()
-            stop.in_epoch = False
             if asked:
                 tables.close()
                 raise KeyboardInterrupt
+    stop.in_epoch = False
     also(run.epoch, seen(recorder.last(run)))
     tables.close()
     return run, recorder

@@ -201,7 +201,16 @@ def compared(played: Played, of: Ints, reference: Reference, rng: Generator) -> 
     better = np.stack([np.stack([improvement(x, y) for y in groups], axis=1) for x in groups], axis=1)
     single = owned.sum(axis=1) == 1
     better[1:, single[:, np.newaxis] & single] = np.nan
+    lone = np.array([len(counts) for counts in played.fixed]) == 1
+    unknown(runs, lone)
+    unknown(algorithms, (owned[:, lone].sum(axis=1) == 1) & single)
     return Comparison(runs, algorithms, middle[0], middle[1:], better[0], better[1:])
+
+
+def unknown(figures: Figures, lone: Bools) -> None:
+    """Takes the samples from ``lone`` (K,) players, of whom one sampled team is known: others might be anything."""
+    figures.mixed_samples[:, lone] = np.nan
+    figures.expected_samples[:, lone] = np.nan
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def encounters(
     env, seed = parts.games.env, key(rng)
     members = policies(parts.optimizer.islands, run.population, explore=False)
     acting = joined([members, fixed_policies(range(env.standard_policies))])
-    theirs = np.repeat(reference.teams + run.population.size, each, axis=0)
+    theirs = rng.permuted(np.repeat(reference.teams + run.population.size, each, axis=0), axis=1)
     scores = np.zeros((len(theirs), 2))
     first, kept = 0, None
     if sheet is not None:

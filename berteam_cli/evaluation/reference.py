@@ -16,7 +16,7 @@ from berteam_cli.env.base import Env
 from berteam_cli.evaluation.tournament import tournament
 from berteam_cli.games import Games
 from berteam_cli.outcomes import Floats, Ints
-from berteam_cli.selector.base import unordered_teams
+from berteam_cli.selector.base import team_count, unordered_teams
 
 log = logging.getLogger("berteam")
 
@@ -47,10 +47,25 @@ def table_name(env: Env) -> str:
 
 def reference_teams(policies: int, team_size: int, most: int) -> Ints:
     """Returns the teams of fixed policies, (J, T): all of them, or ``most`` evenly spaced ones if they are more."""
-    teams = unordered_teams(policies, team_size)
-    if len(teams) <= most:
-        return teams
-    return teams[np.unique(np.linspace(0, len(teams) - 1, most).round().astype(int))]
+    count = team_count(policies, team_size)
+    if count <= most:
+        return unordered_teams(policies, team_size)
+    spaced = np.unique(np.linspace(0, count - 1, most).round().astype(np.int64))
+    return np.array([team_at(index, policies, team_size) for index in spaced.tolist()], dtype=np.int64)
+
+
+def team_at(index: int, policies: int, team_size: int) -> list[int]:
+    """Returns the unordered team at ``index`` of all, members ascending, in lexicographic order."""
+    team: list[int] = []
+    member = 0
+    while len(team) < team_size:
+        beginning = team_count(policies - member, team_size - len(team) - 1)  # teams that go on with this member
+        if index < beginning:
+            team.append(member)
+        else:
+            index -= beginning
+            member += 1
+    return team
 
 
 def reference(games: Games, most: int) -> Reference:

@@ -40,6 +40,7 @@ class Chosen:
         listed: (K,) whether a team is there for being among the most probable ones.
         draws: (K,) how often a team was drawn, by its probability, from all those that are not listed.
         listed_mass: probability of the listed teams together.
+        sampled: of how many drawn teams the probabilities of the listed ones are shares; 0: they are exact.
     """
 
     teams: Ints
@@ -47,6 +48,7 @@ class Chosen:
     listed: Bools
     draws: Ints
     listed_mass: float
+    sampled: int = 0
 
     def __len__(self) -> int:
         return len(self.teams)
@@ -79,19 +81,20 @@ class Truth:
         Sum of P(team) Elo(team) over all unordered teams. The mean of the drawn teams stands for those that are not
         listed; how they scatter is in the width, by Student's t. Where fewer than two were drawn, the listed ones stand
         for a rest below SMALL, and what it could change within the range of the Elos is in the width; what a larger
-        rest leaves unknown is NaN.
+        rest leaves unknown is NaN. Where the listed ones' probabilities are shares of drawn teams, so is how those
+        scatter.
         """
         chosen = self.chosen
         rest = 1.0 - chosen.listed_mass
         errors = self.half_widths / Z_95
         weights = np.where(chosen.listed, chosen.probability, 0.0)
         quantile = Z_95
-        variance = 0.0
         if rest > NEGLIGIBLE:
             drawn = int(chosen.draws.sum())
             if drawn < 2 and rest < SMALL:
                 weights /= chosen.listed_mass
-                width = quantile * np.sqrt(((weights * errors) ** 2).sum()) + rest * np.ptp(self.elos)
+                variance = ((weights * errors) ** 2).sum() + self._of_shares(0.0)
+                width = quantile * np.sqrt(variance) + rest * np.ptp(self.elos)
                 return float(weights @ self.elos), float(width)
             if drawn == 0:
                 return math.nan, math.nan
@@ -99,12 +102,25 @@ class Truth:
             if drawn == 1:
                 return float(weights @ self.elos), math.nan
             mean = chosen.draws @ self.elos / drawn
-            scatter = chosen.draws @ (self.elos - mean) ** 2 / (drawn - 1)  # the teams' own errors are in it
-            variance = float(rest**2 * scatter / drawn)
+            # The teams' own errors are in it, as if each were drawn once: those of a team have one error, not several.
+            scatter = chosen.draws @ (self.elos - mean) ** 2 / (drawn - 1)
+            alike = (chosen.draws * (chosen.draws - 1)) @ errors**2 / (drawn - 1)
+            variance = float(rest**2 * (scatter + alike) / drawn) + self._of_shares(float(mean))
             quantile = float(stdtrit(drawn - 1, 0.975))
             errors = np.where(chosen.listed, errors, 0.0)
+        else:
+            variance = self._of_shares(0.0)
         variance += ((weights * errors) ** 2).sum()
         return float(weights @ self.elos), float(quantile * np.sqrt(variance))
+
+    def _of_shares(self, others: float) -> float:
+        """Returns the variance of the mean Elo that comes of the listed teams' shares; ``others``: Elo of the rest."""
+        chosen = self.chosen
+        if not chosen.sampled:
+            return 0.0
+        shares, rest = np.where(chosen.listed, chosen.probability, 0.0), max(1.0 - chosen.listed_mass, 0.0)
+        middle = shares @ self.elos + rest * others
+        return float(shares @ (self.elos - middle) ** 2 + rest * (others - middle) ** 2) / chosen.sampled
 
     def predicted_elos(self) -> Floats:
         """Returns (K,) the Elos that the selector's probabilities speak of: 1000 + 400 log10 of P over its mean.
@@ -155,6 +171,7 @@ def choose_teams(
         np.arange(len(top) + len(unique)) < len(top),
         np.concatenate([np.zeros(len(top), dtype=np.int64), draws]),
         mass,
+        distribution.samples,
     )
 
 

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Protocol
 
+FINISHED, FAILED, KILLED = ENDS = "finished", "failed", "killed"
+
 
 class Logger(Protocol):
     """Takes figures by name, epoch by epoch."""
@@ -19,8 +21,8 @@ class Logger(Protocol):
     def flush(self) -> None:
         """Has everything written on the disk."""
 
-    def close(self) -> None:
-        """Ends."""
+    def close(self, ended: str) -> None:
+        """Ends; ``ended``: how the run did, one of ENDS."""
 
 
 class Once:

@@ -18,5 +18,5 @@ class Nowhere:
     def flush(self) -> None:
         """Does nothing."""
 
-    def close(self) -> None:
+    def close(self, ended: str) -> None:
         """Does nothing."""

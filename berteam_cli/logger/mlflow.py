@@ -63,6 +63,6 @@ class Mlflow:
     def flush(self) -> None:
         """Does nothing: everything is written at once."""
 
-    def close(self) -> None:
-        """Ends the run."""
-        self.client.set_terminated(self.run)
+    def close(self, ended: str) -> None:
+        """Ends the run as it ``ended``."""
+        self.client.set_terminated(self.run, status=ended.upper())

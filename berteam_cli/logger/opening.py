@@ -16,7 +16,7 @@ import numpy as np
 from berteam_cli.config_groups import LoggerConfig
 from berteam_cli.errors import InputError
 from berteam_cli.evaluation.sight import Sight
-from berteam_cli.logger.base import Logger, Once
+from berteam_cli.logger.base import FAILED, FINISHED, KILLED, Logger, Once
 from berteam_cli.logger.csv import Nowhere
 from berteam_cli.training import Parts, Report, Run
 
@@ -62,10 +62,15 @@ def logger(config: LoggerConfig, folder: Path, manifest: Mapping[str, Any], told
         from berteam_cli.logger.mlflow import Mlflow  # noqa: PLC0415 (an extra)
 
         opened = Mlflow(folder, identity, told, **settings)
+    ended = FAILED
     try:
         yield Once(opened)
+        ended = FINISHED
+    except KeyboardInterrupt:
+        ended = KILLED
+        raise
     finally:
-        opened.close()
+        opened.close(ended)
 
 
 def figures_of(
@@ -93,7 +98,7 @@ def figures_of(
     }
     figures |= {f"selector/{name}": value for name, value in state.items()}
     fitness = parts.optimizer.fitness.shown(run.population.fitness)
-    for island in parts.optimizer.islands:
+    for island in (x for x in parts.optimizer.islands if not x.exploits):  # these are not rated
         members = fitness[island.members]
         figures |= {f"fitness/{island.name}": members.mean(), f"fitness/{island.name}_best": members.max()}
     figures |= {"population/replaced": len(report.replaced)}

@@ -38,7 +38,7 @@ class Tensorboard:
         """Writes what waits to be written."""
         self.writer.flush()
 
-    def close(self) -> None:
+    def close(self, ended: str) -> None:
         """Ends the file."""
         self.writer.close()
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from berteam_cli.logger.base import FINISHED
+
 
 class Wandb:
     """A run of Weights & Biases; it drops by itself what it was told of an epoch before."""
@@ -44,6 +46,6 @@ class Wandb:
     def flush(self) -> None:
         """Does nothing: a process of its own writes."""
 
-    def close(self) -> None:
-        """Ends the run."""
-        self.run.finish()
+    def close(self, ended: str) -> None:
+        """Ends the run; one that is not finished counts as failed."""
+        self.run.finish(exit_code=int(ended != FINISHED))

@@ -7,6 +7,7 @@ same bytes, when it goes on from there.
 from __future__ import annotations
 
 import os
+import resource
 import zlib
 from collections.abc import Iterable
 from dataclasses import replace
@@ -17,11 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from berteam_cli.acting import DEEPEST, Policies
+from berteam_cli.errors import InputError
 from berteam_cli.opponents.exploiters import Attempt
 from berteam_cli.opponents.league import LeagueState
 from berteam_cli.opponents.past import Snapshot
 from berteam_cli.opponents.record import Record
 
+OTHER_FILES = 256  # that may be open beside those of the pool
 POOL = "pool"
 """The folder in a run's, where its snapshots are."""
 KEPT = tuple(name for name in Policies._fields if name != "pay")  # nobody pays the past
@@ -118,7 +121,27 @@ def restored(tensors: dict[str, Any], folder: Path) -> LeagueState:
 
 
 def pruned(folder: Path, needed: Iterable[str]) -> None:
-    """Removes the files of ``folder`` that no checkpoint needs any more."""
+    """Removes the files of ``folder`` that no checkpoint needs any more; others are not the pool's.
+
+    (Of a file that is removed while it is read a file system over a network may keep one of another name.)
+    """
     if folder.is_dir():
-        for name in {path.name for path in folder.iterdir()} - set(needed):
+        for name in {path.name for path in folder.iterdir() if path.suffix in (".npy", ".part")} - set(needed):
             (folder / name).unlink()
+
+
+def check_files(size: int) -> None:
+    """Checks that a pool of ``size`` snapshots may be open, a file each, and asks the system for as many.
+
+    Raises:
+        InputError: it may not.
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft == resource.RLIM_INFINITY or size + OTHER_FILES <= soft:
+        return
+    if hard != resource.RLIM_INFINITY and size + OTHER_FILES > hard:
+        raise InputError(
+            f"opponents.pool_size must be <= {max(hard - OTHER_FILES, 0)}, as a snapshot is an open file and this "
+            f"machine allows a process {hard} (ulimit -Hn), but is {size}."
+        )
+    resource.setrlimit(resource.RLIMIT_NOFILE, (size + OTHER_FILES, hard))

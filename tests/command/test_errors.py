@@ -11,7 +11,9 @@ SB3 = ("train", "population=ppo6", "learner=sb3")
 
 CASES = {
     ("tournament", "rating=glicko"): "rating must be one of davidson, ml, paper, but is 'glicko'",
-    ("tournament", "sprt.rounds=9", "sprt.elo0=5", "sprt.elo1=5"): "sprt.elo0 must be below sprt.elo1",
+    ("tournament", "sprt.rounds=9", "sprt.elo0=0", "sprt.elo1=20"): (
+        "sprt.elo0 must be below 0 and sprt.elo1 above it, but they are 0 and 20"
+    ),
     ("tournament", "env=rps", "env.sides=3", "rating=davidson"): "rating=davidson is for games of two sides",
     ("tournament", "env=rps", "env.sides=3", "sprt.rounds=2"): "sprt.rounds=2 is for games of two sides",
     ("reproduce", "paper_fxed"): "what must be one of .*Did you mean paper_fixed",
@@ -114,6 +116,9 @@ CASES = {
     ("train", "-m", "learner=sb3", "population=ppo6", "learner.algorithm=A2C,SAC"): "learner.algorithm cannot be SAC",
     ("train", "env=rps", "population=fixed_policies"): "policies.*env=rps.*rock",
     ("train", "env=rps", "population=ppo6", "optimizer=mapelites"): "optimizer.opponents.*rock",
+    ("train", "optimizer=mapelites", "optimizer.opponents=[]", "team_size=11"): (
+        "optimizer.opponents must make at most 10,000 teams of team_size=11, .* its 7 policies make 12,376"
+    ),
     ("train", "selector=mcaa", "optimizer.fitness=elo"): "selector=mcaa has none",
     ("train", "team_size=513"): "team_size must be >= 1 and <= 512, but is 513",
     ("train", "selector.exact_limit=0"): "selector.exact_limit must be >= 1, but is 0",

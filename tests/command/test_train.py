@@ -6,11 +6,14 @@ import shutil
 import signal
 import subprocess
 import time
+import weakref
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from berteam_cli import checkpoint
+from berteam_cli.command import train
 from berteam_cli.records import COLUMNS, GROWING
 from tests.command.conftest import BERTEAM, SMALL_BERTEAM, TINY
 
@@ -258,6 +261,27 @@ def test_a_run_killed_at_once_goes_on(tmp_path, process):
     manifest = json.loads((tmp_path / "cut" / "manifest.json").read_text())
     assert manifest["status"] == "done"
     assert len(manifest["resumed"]) == 1
+
+
+def test_what_was_loaded_does_not_stay_in_memory(berteam, monkeypatch):
+    words = ["selector=uniform", "population=ppo6", *TINY, "evaluation.games=0", "out=run"]
+    berteam("train", *words)
+    loaded, alive = [], []
+    load, end = checkpoint.load, train.conclude
+
+    def kept(*args):
+        saved = load(*args)
+        loaded[:] = [weakref.ref(saved), weakref.ref(saved.run)]
+        return saved
+
+    def looked(*args):
+        alive[:] = [ref() is not None for ref in loaded]
+        return end(*args)
+
+    monkeypatch.setattr(checkpoint, "load", kept)
+    monkeypatch.setattr(train, "conclude", looked)
+    berteam("resume", "run", "epochs=5")
+    assert alive == [False, False]
 
 
 def test_resume_refuses_what_would_not_be_the_same_run(berteam, tmp_path):

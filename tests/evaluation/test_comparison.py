@@ -112,6 +112,18 @@ def test_a_stronger_algorithm_is_said_to_be_stronger():
     assert (found.algorithms.mixed < high).all()
 
 
+def test_one_sampled_team_tells_nothing_of_others():
+    one, many = np.array([[[3, 0, 1]] * 2]), np.array([[[0, 2, 2]] * 2, [[3, 0, 1]] * 2])
+    found = compared(
+        Played(np.full((4, 4, 3), 5), [one, many, one, many]), np.array([0, 1, 2, 2]), ANCHORS, np.random.default_rng(3)
+    )
+    for figures, lone in ((found.runs, [0, 2]), (found.algorithms, [0])):
+        for samples in (figures.mixed_samples, figures.expected_samples):
+            assert np.flatnonzero(np.isnan(samples).any(axis=0)).tolist() == lone
+    assert not np.isnan(found.runs.mixed).any()
+    assert not np.isnan(found.improvement_samples[:, 0, 2]).any()
+
+
 def test_the_expected_elo_is_the_mean_of_the_sampled_teams():
     strong, weak = np.array([[3, 0, 1]] * 2), np.array([[0, 2, 2]] * 2)
     mixed = Played(np.zeros((2, 2, 3), int), [np.stack([strong] * 3 + [weak]), np.stack([weak] * 4)])

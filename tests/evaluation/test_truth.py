@@ -135,6 +135,38 @@ def test_the_interval_of_the_expected_elo_covers_it():
     assert 0.90 <= covered / 300 <= 1
 
 
+def test_the_interval_holds_where_shares_are_of_few_draws():
+    """Of 400 samples of 200 teams, about 95 % have the truth in their interval, of which the shares are the most."""
+    rng = np.random.default_rng(6)
+    flat = distribution(np.full(10, 0.1))
+    elos = np.linspace(600, 1400, 10)
+    by_team = {tuple(t): e for t, e in zip(flat.teams, elos, strict=True)}
+    covered = 0
+    for seed in range(400):
+        draw = drawn_by(flat, seed)
+        teams, counts = np.unique(np.sort(draw(200), axis=1), axis=0, return_counts=True)
+        chosen = choose_teams(TeamDistribution(teams, counts / 200, samples=200), draw, 1, 14)
+        errors = rng.normal(0, 10, size=10)
+        known = np.array([by_team[tuple(t)] for t in chosen.teams]) + errors[: len(chosen)]
+        none = independent(*np.zeros((3, len(chosen), 1), dtype=int))
+        mean, width = Truth(chosen, known, np.full(len(chosen), 19.6), none).expected_elo()
+        covered += abs(mean - 1000) <= width
+    assert 0.92 <= covered / 400 <= 0.98
+
+
+def test_the_interval_holds_where_the_same_teams_are_drawn_again():
+    """Six teams of a rest of 20, drawn 40 times: the error of each is one, however often it came."""
+    rng = np.random.default_rng(7)
+    true = rng.normal(1000, 20, size=6)
+    covered = 0
+    for _ in range(1000):
+        draws = rng.multinomial(40, np.full(6, 1 / 6))
+        found = rated(np.full(6, 0.001), true + rng.normal(0, 60, size=6), False, draws, width=1.96 * 60)
+        mean, width = found.expected_elo()
+        covered += abs(mean - true.mean()) <= width
+    assert 0.92 <= covered / 1000 <= 0.98
+
+
 def test_predicted_elo_by_hand():
     predicted = rated([0.5, 0.05, 0.005, 0.0], [1, 2, 3, 4]).predicted_elos()
     np.testing.assert_allclose(predicted[:3], [1400, 1000, 600])

@@ -1,10 +1,13 @@
 """The figures of an epoch where loggers show them."""
 
 import shutil
+from contextlib import nullcontext
 
 import pandas as pd
 import pytest
 
+from berteam_cli.config_groups import LoggerConfig
+from berteam_cli.logger import opening
 from berteam_cli.logger.base import Once
 from berteam_cli.logger.tensorboard import FOLDER, events
 from tests.command.conftest import TINY, berteam  # noqa: F401 (a fixture)
@@ -87,6 +90,24 @@ def test_a_run_may_go_on_with_another_logger(berteam, tmp_path):  # noqa: F811
     assert list(shown(tmp_path / "run")["selector/buffer"]) == [5, 6]
     berteam("train", *SMALL, "out=run", "on_exists=overwrite")
     assert not (tmp_path / "run" / FOLDER).exists()
+
+
+@pytest.mark.parametrize(("error", "ended"), [(None, "finished"), (OSError, "failed"), (KeyboardInterrupt, "killed")])
+def test_it_is_told_how_the_run_ended(error, ended, tmp_path, monkeypatch):
+    told = []
+    monkeypatch.setattr(opening.Nowhere, "close", lambda self, how: told.append(how))
+    opened = opening.logger(LoggerConfig(name="csv"), tmp_path, {"started": "now"}, {})
+    with nullcontext() if error is None else pytest.raises(error), opened:
+        if error is not None:
+            raise error
+    assert told == [ended]
+
+
+def test_exploiters_are_not_rated(berteam, tmp_path):  # noqa: F811
+    words = ["experiment=strong", *TINY, "evaluation.games=0", "evaluate_every=0", "logger=tensorboard", "out=run"]
+    berteam("train", *words, "games_per_epoch=8")
+    names = {name for name in shown(tmp_path / "run") if name.startswith("fitness/")}
+    assert names == {"fitness/ppo64", "fitness/ppo64_best"}  # of ppo64 and the exploiters, ppo96
 
 
 class Kept:

@@ -1,5 +1,6 @@
 """The files of the pool, and what a checkpoint does when one is not what it was."""
 
+import resource
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from berteam_cli import checkpoint
 from berteam_cli.checkpoint import Saved
-from berteam_cli.errors import RunError
+from berteam_cli.errors import InputError, RunError
 from berteam_cli.fitting import check_run
 from berteam_cli.opponents import pool
 from berteam_cli.training import begin, epoch
@@ -49,6 +50,33 @@ def test_only_what_the_two_checkpoints_need_stays(runs, tmp_path):
     needed = set(pool.names(runs[3].league)) | set(pool.names(runs[2].league))
     assert {path.name for path in (tmp_path / "pool").iterdir()} == needed
     assert len(runs[3].league.pool) == 3
+
+
+def test_files_of_others_stay(runs, made, tmp_path):
+    """As a file system over a network keeps one that is removed while it is read."""
+    (tmp_path / "pool" / ".nfs0001").touch()
+    (tmp_path / "pool" / "00000099.part").touch()
+    checkpoint.save(tmp_path, Saved(epoch(runs[3], made)[0], {}, 0.0), made)
+    assert (tmp_path / "pool" / ".nfs0001").exists()
+    assert not (tmp_path / "pool" / "00000099.part").exists()
+
+
+def test_a_pool_has_as_many_files_open_as_it_needs():
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (300, before[1]))
+        pool.check_files(44)
+        assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] == 300
+        parts("opponents=past", "opponents.pool_size=500")
+        assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] == 756
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
+def test_a_pool_of_more_files_than_may_be_open_is_refused(monkeypatch):
+    monkeypatch.setattr(resource, "getrlimit", lambda of: (300, 1000))
+    with pytest.raises(InputError, match=r"opponents.pool_size must be <= 744, .* but is 745"):
+        parts("opponents=past", "opponents.pool_size=745")
 
 
 def test_what_is_on_the_disk_is_what_was_in_memory(made, tmp_path):
