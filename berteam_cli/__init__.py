@@ -9,4 +9,4 @@ rating/          Elo
 evaluation/      tournaments and the true strength of teams
 """
 
-__version__ = "0.8.1"
+__version__ = "0.8.2"
