@@ -25,7 +25,9 @@ from berteam_cli.evolving import breeding, measured_by, niches
 from berteam_cli.frozen import everybody
 from berteam_cli.games import Games
 from berteam_cli.memory import Room, check_memory
+from berteam_cli.opponents.league import League
 from berteam_cli.opponents.none import Nobody
+from berteam_cli.opponents.pool import check_files
 from berteam_cli.opposing import opponents as opposing
 from berteam_cli.opposing import without_exploiters
 from berteam_cli.optimizer.base import Optimizer
@@ -142,6 +144,8 @@ def parts(config: TrainConfig, *, stored: Path | None = None, read_only: bool = 
             settings: Any = config.selector  # of one that remembers
             rooms.append(Room(selecting.seen_bytes, "selector.capacity", settings.capacity))
         check_memory(islands, rooms)
+        if isinstance(others, League):
+            check_files(others.most_snapshots(config.epochs))
     return Parts(
         seed=config.seed,
         games_per_epoch=config.games_per_epoch,

@@ -22,7 +22,7 @@ from berteam_cli.selector.base import team_count
 from berteam_cli.training import ARCHIVE, generator
 
 MOST_CELLS = 10_000
-MOST_TEAMS = 10_000
+MOST_TEAMS = 100_000
 UNMOVED = {"learning_rate": 0.0, "entropy_coef": 0.0, "gamma": 1.0}
 """Values that no factor moves."""
 

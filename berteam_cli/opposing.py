@@ -14,7 +14,6 @@ from berteam_cli.opponents.exploiters import Exploiters
 from berteam_cli.opponents.league import League
 from berteam_cli.opponents.none import Nobody
 from berteam_cli.opponents.past import Past
-from berteam_cli.opponents.pool import check_files
 from berteam_cli.opponents.scripted import Scripted
 from berteam_cli.outcomes import Bools
 from berteam_cli.population import Island, learners, rated
@@ -78,14 +77,9 @@ def games_of(config: TrainConfig, share: str) -> int:
 
 
 def past(told: OpponentsConfig, games: int, prior: float) -> Past | None:
-    """Returns the settings of the pool.
-
-    Raises:
-        InputError: it is larger than there may be open files.
-    """
+    """Returns the settings of the pool."""
     if not games or not isinstance(told, PastConfig):
         return None
-    check_files(told.pool_size)
     return Past(
         games=games,
         snapshot_every=told.snapshot_every,

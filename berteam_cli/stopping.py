@@ -21,7 +21,7 @@ class Stop:
 
     Attributes:
         asked: somebody did.
-        in_epoch: an epoch is under way: its half must not be saved, so the run ends after it.
+        in_epoch: epochs are under way: half of one must not be saved, so the run ends after it.
         file: whoever makes or touches it asks, too, from wherever the run may not hear of a signal; None for none.
         touched: when that was done last before the run began, in ns; 0: it was not there.
     """
@@ -30,6 +30,15 @@ class Stop:
     in_epoch: bool = False
     file: Path | None = None
     touched: int = 0
+
+    @contextmanager
+    def epochs(self) -> Iterator[None]:
+        """Tells that epochs are under way."""
+        self.in_epoch = True
+        try:
+            yield
+        finally:
+            self.in_epoch = False
 
     def wanted(self) -> bool:
         """Returns whether the run is to end."""
@@ -45,7 +54,7 @@ def when(file: Path | None) -> int:
 
 @contextmanager
 def stoppable(file: Path | None = None) -> Iterator[Stop]:
-    """Lets Ctrl-C, SIGTERM and SIGHUP end the run after its epoch, at once between epochs, and at once if repeated.
+    """Lets Ctrl-C, SIGTERM and SIGHUP end the run after its epoch, and at once if repeated, or outside of its epochs.
 
     Whoever touches ``file`` from now on asks for its end after an epoch, too. SIGHUP stays ignored where it is, as
     nohup has it: such a run outlives its terminal.

@@ -76,8 +76,8 @@ def compare(config: CompareConfig, text: str, folder: Path | None = None) -> flo
         outcomes = play_all(games, plan.acting, plan.lineups, key(rng), f"Comparing {len(runs)} runs", sheet)
         if min(plan.teams) < FEW:
             log.warning(
-                "Only %d teams of a run met the fixed ones: intervals of Elos are too narrow for so few; with a larger "
-                "reference_games there are more.",
+                "Only %d teams of a run met the fixed ones: intervals of Elos are too narrow or empty; with a "
+                "larger reference_games there are more.",
                 min(plan.teams),
             )
         played = counted(plan, outcomes, len(known.teams))

@@ -29,7 +29,7 @@ def export(folder: Path, overrides: list[str]) -> Path:
 
     Args:
         folder: of a training run.
-        overrides: ``key=value`` of KEYS, and ``trust=module:function``.
+        overrides: ``key=value`` of KEYS.
 
     Raises:
         InputError: there is no such run or member, it has no networks, or a file is in the way.

@@ -163,9 +163,8 @@ def trained(
     pace = Pace(run.epoch, config.epochs)
     view = View(parts, config.epochs, pace, run)
     view.tell(run, tables.rows("generations"), distribution, sight)
-    with shown(view):
+    with shown(view), stop.epochs():
         while run.epoch < config.epochs:
-            stop.in_epoch = True
             run, report = epoch(run, parts)
             run = replace(run, league=pool.on_disk(run.league, folder / pool.POOL))
             state, distribution, sight = recorder.epoch(run, report)
@@ -178,7 +177,9 @@ def trained(
             if asked:
                 tables.close()
                 raise KeyboardInterrupt
-    stop.in_epoch = False
+    if stop.wanted():  # since the last epoch was saved
+        tables.close()
+        raise KeyboardInterrupt
     also(run.epoch, seen(recorder.last(run)))
     tables.close()
     return run, recorder

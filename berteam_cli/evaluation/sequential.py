@@ -24,8 +24,8 @@ class Sprt:
 
     Attributes:
         rounds: at most so many rounds of games; 1 tests nothing.
-        elo0: Elo difference of the hypothesis that is kept below the lower bound.
-        elo1: of the one that is accepted above the upper bound, > elo0.
+        elo0: Elo difference of the hypothesis that is kept below the lower bound, < 0.
+        elo1: of the one that is accepted above the upper bound, > 0.
         alpha: chance to accept elo1 where elo0 is true.
         beta: chance to keep elo0 where elo1 is true.
     """

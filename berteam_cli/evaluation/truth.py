@@ -93,7 +93,7 @@ class Truth:
             drawn = int(chosen.draws.sum())
             if drawn < 2 and rest < SMALL:
                 weights /= chosen.listed_mass
-                variance = ((weights * errors) ** 2).sum() + self._of_shares(0.0)
+                variance = ((weights * errors) ** 2).sum() + self._of_shares(float(weights @ self.elos))
                 width = quantile * np.sqrt(variance) + rest * np.ptp(self.elos)
                 return float(weights @ self.elos), float(width)
             if drawn == 0:
@@ -110,6 +110,7 @@ class Truth:
             errors = np.where(chosen.listed, errors, 0.0)
         else:
             variance = self._of_shares(0.0)
+            quantile = float(stdtrit(chosen.sampled - 1, 0.975)) if chosen.sampled else Z_95
         variance += ((weights * errors) ** 2).sum()
         return float(weights @ self.elos), float(quantile * np.sqrt(variance))
 

@@ -59,6 +59,13 @@ class League:
         """G, games of an epoch that are against them."""
         return sum(kind.games for kind in (self.past, self.scripted, self.exploiters) if kind)
 
+    def most_snapshots(self, epochs: int) -> int:
+        """Returns how many snapshots the pool may hold in a run of so many ``epochs``."""
+        if self.past is None:
+            return 0
+        exploiting = len(self.exploiters.begun()) if self.exploiters else 0
+        return min(self.past.pool_size, 1 + epochs // self.past.snapshot_every + epochs * exploiting)
+
     def begun(self, population: Population) -> LeagueState:
         """Returns the state before the first epoch: the pool holds the members of the beginning."""
         pool = (self.past.frozen(self.islands, population, 0),) if self.past else ()

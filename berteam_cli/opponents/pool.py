@@ -130,18 +130,20 @@ def pruned(folder: Path, needed: Iterable[str]) -> None:
             (folder / name).unlink()
 
 
-def check_files(size: int) -> None:
-    """Checks that a pool of ``size`` snapshots may be open, a file each, and asks the system for as many.
+def check_files(snapshots: int) -> None:
+    """Checks that so many ``snapshots`` may be open, a file each, and asks the system for as many.
 
     Raises:
-        InputError: it may not.
+        InputError: they may not.
     """
+    needed = snapshots + OTHER_FILES
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft == resource.RLIM_INFINITY or size + OTHER_FILES <= soft:
+    if soft == resource.RLIM_INFINITY or needed <= soft:
         return
-    if hard != resource.RLIM_INFINITY and size + OTHER_FILES > hard:
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (needed, hard))
+    except (ValueError, OSError):  # more than `hard`, or than the system has for a process
         raise InputError(
-            f"opponents.pool_size must be <= {max(hard - OTHER_FILES, 0)}, as a snapshot is an open file and this "
-            f"machine allows a process {hard} (ulimit -Hn), but is {size}."
-        )
-    resource.setrlimit(resource.RLIMIT_NOFILE, (size + OTHER_FILES, hard))
+            f"opponents.pool_size must be smaller: a snapshot is an open file, and this machine does not allow a "
+            f"process the {needed} that {snapshots} of them need (ulimit -Hn says {hard})."
+        ) from None

@@ -116,8 +116,8 @@ CASES = {
     ("train", "-m", "learner=sb3", "population=ppo6", "learner.algorithm=A2C,SAC"): "learner.algorithm cannot be SAC",
     ("train", "env=rps", "population=fixed_policies"): "policies.*env=rps.*rock",
     ("train", "env=rps", "population=ppo6", "optimizer=mapelites"): "optimizer.opponents.*rock",
-    ("train", "optimizer=mapelites", "optimizer.opponents=[]", "team_size=11"): (
-        "optimizer.opponents must make at most 10,000 teams of team_size=11, .* its 7 policies make 12,376"
+    ("train", "optimizer=mapelites", "optimizer.opponents=[]", "team_size=20"): (
+        "optimizer.opponents must make at most 100,000 teams of team_size=20, .* its 7 policies make 230,230"
     ),
     ("train", "selector=mcaa", "optimizer.fitness=elo"): "selector=mcaa has none",
     ("train", "team_size=513"): "team_size must be >= 1 and <= 512, but is 513",

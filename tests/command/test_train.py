@@ -284,6 +284,32 @@ def test_what_was_loaded_does_not_stay_in_memory(berteam, monkeypatch):
     assert alive == [False, False]
 
 
+@pytest.mark.parametrize("moment", ["between two epochs", "after the last one"])
+def test_a_signal_outside_of_an_epoch_loses_nothing(moment, berteam, tmp_path, monkeypatch):
+    words = ["selector=uniform", "population=ppo6", *TINY, "checkpoint_every=100", "evaluation.games=8", "out=run"]
+    done, keep = train.epoch, checkpoint.save
+
+    def at_the_beginning(run, parts):
+        if run.epoch == 1:  # the first thing in the second epoch is the last between the two
+            signal.raise_signal(signal.SIGINT)
+        return done(run, parts)
+
+    def at_the_end(folder, saved, parts):
+        keep(folder, saved, parts)
+        if saved.run.epoch == 4:
+            signal.raise_signal(signal.SIGINT)
+
+    between = moment == "between two epochs"
+    monkeypatch.setattr(*((train, "epoch", at_the_beginning) if between else (checkpoint, "save", at_the_end)))
+    berteam("train", *words, code=130)
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert len(read(tmp_path / "run", "timing")) == (2 if between else 4)
+    assert not (tmp_path / "run" / "summary.csv").exists()
+    berteam("resume", "run")
+    assert len(read(tmp_path / "run", "timing")) == 4
+
+
 def test_resume_refuses_what_would_not_be_the_same_run(berteam, tmp_path):
     berteam("train", "env=rps", "population=hands", "optimizer=fixed", "selector=uniform", "epochs=3", "out=run")
     assert "epochs must be >= 3" in berteam("resume", "run", "epochs=2", code=2).stderr

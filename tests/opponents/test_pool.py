@@ -61,22 +61,26 @@ def test_files_of_others_stay(runs, made, tmp_path):
     assert not (tmp_path / "pool" / "00000099.part").exists()
 
 
-def test_a_pool_has_as_many_files_open_as_it_needs():
+def test_a_pool_has_as_many_files_open_as_it_needs_and_may():
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    soft = min(before[1], 1000) - 300 if before[1] != resource.RLIM_INFINITY else 700
     try:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (300, before[1]))
-        pool.check_files(44)
-        assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] == 300
-        parts("opponents=past", "opponents.pool_size=500")
-        assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] == 756
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, before[1]))
+        pool.check_files(soft - 256)
+        assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] == soft
+        pool.check_files(soft)
+        assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] == soft + 256
+        with pytest.raises(InputError, match=r"opponents.pool_size must be smaller: .* the \d+ that \d+ of them need"):
+            pool.check_files(2**62)
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, before)
 
 
-def test_a_pool_of_more_files_than_may_be_open_is_refused(monkeypatch):
-    monkeypatch.setattr(resource, "getrlimit", lambda of: (300, 1000))
-    with pytest.raises(InputError, match=r"opponents.pool_size must be <= 744, .* but is 745"):
-        parts("opponents=past", "opponents.pool_size=745")
+def test_a_pool_is_as_large_as_the_run_can_make_it(made):
+    """Of four epochs: the beginning and each of them, and of either kind of exploiters one an epoch at most."""
+    league = made.opponents
+    assert replace(league, past=replace(league.past, pool_size=100)).most_snapshots(4) == 13
+    assert league.most_snapshots(4) == 3
 
 
 def test_what_is_on_the_disk_is_what_was_in_memory(made, tmp_path):
