@@ -54,8 +54,8 @@ OF_THE_PAPER = (
     ("paper_comparison selector=mcaa optimizer=mapelites", 16, "tab:olive", "comparison, MCAA, MAP-Elites"),
 )
 COURSES = (
-    Course("night/16/evaluation.csv", None, 32, "tab:red", "strong (six seeds)"),
-    *(Course(f"strong/{seed}/evaluation.csv", None, 32, "tab:red", None) for seed in (17, 18, 19, 20, 21)),
+    Course("night/16/evaluation.csv", None, 32, "tab:red", "strong (eleven seeds)"),
+    *(Course(f"strong/{seed}/evaluation.csv", None, 32, "tab:red", None) for seed in range(17, 27)),
     Course("hour/6/evaluation.csv", None, 32, "tab:orange", "strong_past: no exploiters (five seeds)"),
     *(Course(f"strong_past/{seed}/evaluation.csv", None, 32, "tab:orange", None) for seed in (7, 8, 9, 10)),
     *(Course("paper_whole_looks.csv", f"experiment={words}", *drawn) for words, *drawn in OF_THE_PAPER),
