@@ -69,6 +69,10 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
     before, sizes, done = (saved.seconds, saved.table_sizes, saved.run.epoch) if saved else (0.0, None, 0)
     handed = deque([saved.run] if saved else [])  # who takes it lets go of it in time: what was loaded may be large
     del saved
+
+    def took() -> float:
+        return before + time.monotonic() - started
+
     if not handed:
         claim(folder, "overwrite" if goes_on(config, folder) else config.on_exists)
     write_config(folder, text)
@@ -93,7 +97,6 @@ def held_run(config: TrainConfig, text: str, folder: Path, parts: Parts) -> floa
         with manifest.until_the_end(), stoppable(folder.parent / LOCKS / STOP) as stop:
             told: Any = OmegaConf.to_container(OmegaConf.create(text))
             with logger(config.logger, folder, manifest.facts, told) as also:
-                took = lambda: before + time.monotonic() - started  # noqa: E731 (a clock, handed on)
                 run, recorder = trained(config, folder, parts, handed, sizes, took, stop, also)
                 expected = conclude(config.evaluation, folder, run, recorder, manifest, took)
                 also(run.epoch, {"elo/expected": expected})
