@@ -271,6 +271,12 @@ def test_equal_fractions_are_a_draw_and_whole_numbers_are_exact(blue, red, winne
     assert np.sign(alone(Contest(time=2, wages=wages)).gap) == winner
 
 
+def test_agents_that_are_numbers_are_named_in_what_is_refused():
+    with pytest.raises(Unfit, match=r"teams has 7, but the agents are 0, 1, 2, 3\."):
+        places([0, 1, 2, 3], {"blue": [0, 7], "red": [1, 3]})
+    assert places([0, 1, 2, 3], {"blue": [0, 2], "red": [1, 3]}) == (0, 2, 1, 3)
+
+
 def test_a_reward_is_a_number_of_32_bits():
     most = float(np.finfo(np.float32).max)
     assert alone(Contest(time=2, wages={"left_0": [most, -most]})).rewards[0] == [most, -most]

@@ -4,6 +4,7 @@ import torch
 
 from berteam_cli import build
 from berteam_cli.config import checked
+from berteam_cli.evaluation import conditioning
 from berteam_cli.evaluation.conditioning import Encounters, encounters
 from berteam_cli.evaluation.reference import Reference, reference
 from berteam_cli.rating.bradley_terry import held_ratings
@@ -27,6 +28,24 @@ def test_after_one_game_the_winning_answer_is_found(team_size, epochs):
     assert met.before.mean() < 0.75
     elos = met.elos()
     assert elos["gain"][1] > 0
+
+
+def test_opponents_stand_in_any_order_as_their_elos_ask(monkeypatch):
+    met = []
+
+    def noted(run, parts, acting, theirs, rng):
+        met.extend(theirs.tolist())
+        return np.zeros((2, len(theirs)))
+
+    monkeypatch.setattr(conditioning, "met", noted)
+    parts = build.parts(checked(composed("experiment=unknown_opponent", "team_size=2")))
+    known, run = reference(parts.games, 28), begin(parts)
+    encounters(run, parts, known, 60, np.random.default_rng(0))
+    first = run.population.size
+    for k, (a, b) in enumerate(known.teams + first):
+        orders = [tuple(team) for team in met[60 * k : 60 * (k + 1)]]
+        assert set(orders) == {(a, b), (b, a)}
+        assert a == b or 15 < orders.count((a, b)) < 45
 
 
 def test_elos_are_those_of_a_player_who_met_everybody_and_gain_is_their_difference():
