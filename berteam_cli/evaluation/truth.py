@@ -109,7 +109,7 @@ class Truth:
             quantile = float(stdtrit(drawn - 1, 0.975))
             errors = np.where(chosen.listed, errors, 0.0)
         else:
-            variance = self._of_shares(0.0)
+            variance = self._of_shares(0.0)  # there is no rest whose Elo it could be
             quantile = float(stdtrit(chosen.sampled - 1, 0.975)) if chosen.sampled else Z_95
         variance += ((weights * errors) ** 2).sum()
         return float(weights @ self.elos), float(quantile * np.sqrt(variance))

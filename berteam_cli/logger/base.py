@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Protocol
 
-FINISHED, FAILED, KILLED = ENDS = "finished", "failed", "killed"
+FINISHED, FAILED, KILLED = "finished", "failed", "killed"  # how a run ends
 
 
 class Logger(Protocol):
@@ -22,7 +22,7 @@ class Logger(Protocol):
         """Has everything written on the disk."""
 
     def close(self, ended: str) -> None:
-        """Ends; ``ended``: how the run did, one of ENDS."""
+        """Ends; ``ended``: how the run did, FINISHED, FAILED or KILLED."""
 
 
 class Once:
